@@ -1,6 +1,7 @@
 #include "format/rules/whole_textures.h"
 
 #include <algorithm>
+#include <map>
 #include <numeric>
 
 #include "format/rules/allocation.h"
@@ -49,9 +50,9 @@ class GroupSum {
   GroupSum(const TexturedObject& object, const GroupCurve& curve, double displayed_px)
       : object_(object), curve_(curve), displayed_px_(displayed_px) {}
 
-  void add(const WholeTexture& texture) {
+  /// `weights` are the plane's surface_weights().
+  void add(const WholeTexture& texture, const std::vector<float>& weights) {
     const PlaneTables& t = object_.tables[texture.plane];
-    const std::vector<float> weights = surface_weights(t);
     double dssim = 0, weight = 0;
     for (const std::uint16_t f : t.order) {
       const auto w = static_cast<double>(weights[f]);
@@ -100,13 +101,17 @@ std::vector<GroupChoice> group_choices(const TexturedObject& o, const std::vecto
   for (const std::uint32_t base : bases) previews.textures.push_back({base, base});
   for (const PlaneTables& t : o.tables) rungs = std::max(rungs, static_cast<std::uint32_t>(t.rung_count()));
   std::vector<GroupChoice> all{previews};
+  std::map<std::uint32_t, std::vector<float>> weights;  // of a plane
   for (int coarser = kCoarserLevels; coarser >= 0; --coarser)
     for (std::uint32_t rung = 0; rung < rungs; ++rung) {
       GroupSum sum(o, curve, displayed_px);
       for (const std::uint32_t base : bases) {
         const double level = std::max(0.0, level_of(o, base, displayed_px)) + coarser;
         const std::uint32_t plane = plane_at_level(o.textures, base, level);
-        sum.add({base, plane, std::min(rung, static_cast<std::uint32_t>(o.tables[plane].rung_count()) - 1)});
+        const auto [known, fresh] = weights.try_emplace(plane);
+        if (fresh) known->second = surface_weights(o.tables[plane]);
+        sum.add({base, plane, std::min(rung, static_cast<std::uint32_t>(o.tables[plane].rung_count()) - 1)},
+                known->second);
       }
       all.push_back(sum.finish());
     }

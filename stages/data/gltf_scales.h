@@ -11,7 +11,8 @@ struct GltfScales {
     static void archive(auto& s, auto& a) { a(s.path, s.bytes); }
   };
   std::vector<File> files;
-  static void archive(auto& s, auto& a) { a(s.files); }
+  Notes notes;
+  static void archive(auto& s, auto& a) { a(s.files, s.notes); }
 };
 
 }  // namespace texmesh

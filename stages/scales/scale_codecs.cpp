@@ -419,7 +419,7 @@ QuantisationGrid uv_grid(const std::vector<Vec2f>& uv, double largest_texture_px
 }
 
 void coarsen(QuantisationGrid& grid, double cells) {
-  constexpr int kLeastBits = 8;
+  constexpr int kLeastBits = 7;
   const int bits = std::max(kLeastBits, static_cast<int>(std::ceil(std::log2(std::max(cells, 1.0)))));
   if (grid.bits > 0) grid.bits = std::min(grid.bits, bits);
 }

@@ -31,7 +31,7 @@ QuantisationGrid position_grid(const Mesh& mesh, const ScalesOptions& options, i
 QuantisationGrid uv_grid(const std::vector<Vec2f>& uv, double largest_texture_px,
                          const ScalesOptions& options, int max_bits);
 
-/// Makes a grid coarser: as few bits as hold so many cells along an axis, at least 8.
+/// Makes a grid coarser: as few bits as hold so many cells along an axis, at least 7.
 void coarsen(QuantisationGrid& grid, double cells);
 /// The same for the positions of these triangles, of which a tenth at most may lose their area: beside strays
 /// the object is a speck.
@@ -51,7 +51,7 @@ struct ScalePrimitive {
 /// How the primitives of all scales are written; `frames` are those of the scale in hand.
 struct ScaleCoding {
   const Mesh& mesh;
-  const ScalesOptions& options;
+  ScalesOptions options;
   QuantisationGrid position, uv[2];
   bool write_uv[2] = {false, false};
   bool fine_colours = false;   // 16 bits, because 8 would change them

@@ -262,8 +262,7 @@ constexpr std::size_t kMostNodes = 256;
 
 bool parts_merged(const Mesh& mesh) { return mesh.part_names.size() > kMostNodes; }
 
-/// Numbers wedges in the order of their use. Where parts are merged a wedge that two of them share becomes
-/// two.
+/// Numbers wedges in the order of their use. Where parts are merged a wedge of two of them becomes two.
 void number_wedges(ScalePrimitive& p, const std::vector<std::uint16_t>& part,
                    std::vector<std::uint32_t>& index) {
   std::map<std::pair<std::uint32_t, std::uint16_t>, std::uint32_t> shared;
@@ -286,8 +285,7 @@ void number_wedges(ScalePrimitive& p, const std::vector<std::uint16_t>& part,
 /// Two corners in one place.
 bool is_flat(Vec3f a, Vec3f b, Vec3f c) { return a == b || b == c || c == a; }
 
-/// One primitive per part and material. Triangles with two corners in one place of the grid show nothing and
-/// go.
+/// One primitive per part and material, without triangles that have two corners in one place of the grid.
 std::vector<ScalePrimitive> split_primitives(const Mesh& mesh, const NestedScale& scale,
                                              const QuantisationGrid& grid) {
   std::map<std::array<std::uint16_t, 2>, std::pair<ScalePrimitive, std::vector<std::uint16_t>>> primitives;
@@ -492,53 +490,74 @@ struct GlbBeside {
   const NestedScale* scale = nullptr;
   double up_to_px = 0;  // 0: it has no step
   GlbImages images;
-  std::uint32_t texture_px = 0;  // longest side of what it shows
+  std::vector<WholeTexture> pictures;  // those of the images that are no previews
+  std::uint32_t texture_px = 0;        // longest side of what it shows
+  Bytes file;
 };
 
 std::vector<GlbBeside> scales_beside(const NestedScales& scales, const ScaleFiles& files,
                                      const std::vector<ManifestStep>& steps, ScaleGlbs which) {
+  if (which == ScaleGlbs::kEnds || files.stream.empty()) return {};
   std::vector<GlbBeside> wanted;
-  if (which == ScaleGlbs::kEnds || files.stream.empty()) return wanted;
   for (const ScaleFile& file : files.files) {
     const auto step = std::ranges::find(steps, file.scale, &ManifestStep::scale);
     if (!file.glb.empty() || (which == ScaleGlbs::kSteps && step == steps.end())) continue;
-    wanted.push_back({&*std::ranges::find(scales.scales, file.scale, &NestedScale::scale),
-                      step == steps.end() ? 0 : step->up_to_px,
-                      {},
-                      0});
+    GlbBeside& glb = wanted.emplace_back();
+    glb.scale = &*std::ranges::find(scales.scales, file.scale, &NestedScale::scale);
+    if (step != steps.end()) glb.up_to_px = step->up_to_px;
   }
   return wanted;
 }
 
-void choose_textures(const TexturedObject& object, const Fragments& fragments, GlbBeside& glb,
-                     std::map<std::string, WholeTexture>& pictures) {
+void choose_textures(const TexturedObject& object, const Fragments& fragments, GlbBeside& glb) {
   for (const WholeTexture& t : least_textures(object, glb.scale->scale, glb.up_to_px, kGltfFlip)) {
     if (t.rung == WholeTexture::kPreview) continue;
     const std::string path = gltf_image_path(t.plane, t.rung);
     std::ranges::find(glb.images, t.base, &GlbImage::plane)->uri = path.substr(path.rfind('/') + 1);
-    pictures[path] = t;
+    glb.pictures.push_back(t);
     const TexturePlane& plane = fragments.planes[t.plane];
     glb.texture_px = std::max({glb.texture_px, plane.width_px, plane.height_px});
   }
 }
 
-/// Octahedral; at up to 1,024 px. Beside other losses 9 bits of normals are not seen.
-constexpr int kNormalBitsBeside = 9;
+/// Octahedral. As many steps as pixels are enough; beside other losses more than 9 bits are not seen.
+int normal_bits_at(double displayed_px) {
+  return std::clamp(static_cast<int>(std::ceil(std::log2(displayed_px))), 7, 9);
+}
 
-/// Grids as fine as a fourth of a pixel and of a texel: the file serves up to its switch size.
-void coarsen_grids(ScaleCoding& coding, const GlbBeside& glb) {
-  coarsen_positions(coding.position, 4 * glb.up_to_px, coding.mesh, glb.scale->triangles);
-  if (coding.options.mesh_codec == MeshCodec::kDraco)
-    for (QuantisationGrid& uv : coding.uv) coarsen(uv, 4.0 * glb.texture_px * static_cast<double>(uv.range));
+/// With a step: on grids of half a pixel at its switch size and of half a texel.
+Bytes code_beside(const ScaleCoding& coding, const GlbBeside& glb, const std::vector<Material>& materials,
+                  ScaleFrames frames) {
+  ScaleCoding own = coding;
+  own.frames = std::move(frames);
+  if (glb.up_to_px > 0) {
+    own.options.normal_bits = std::min(own.options.normal_bits, normal_bits_at(glb.up_to_px));
+    coarsen_positions(own.position, 2 * glb.up_to_px, own.mesh, glb.scale->triangles);
+    if (own.options.mesh_codec == MeshCodec::kDraco)
+      for (QuantisationGrid& uv : own.uv) coarsen(uv, 2.0 * glb.texture_px * static_cast<double>(uv.range));
+  }
+  return write_scale(own, *glb.scale, materials, glb.images).glb;
+}
+
+/// The finest go until all GLBs together take no more than kMostOverFinest of S_0's.
+void leave_out_finest(const ScaleFiles& files, std::vector<GlbBeside>& made, Notes& notes) {
+  const auto finest = static_cast<double>(files.files.front().glb.size());
+  double room = (kMostOverFinest - 1) * finest - static_cast<double>(files.files.back().glb.size());
+  for (const GlbBeside& glb : made) room -= static_cast<double>(glb.file.size());
+  while (room < 0 && !made.empty()) {
+    room += static_cast<double>(made.front().file.size());
+    add_info(notes, "no-glb", "scale " + std::to_string(made.front().scale->scale),
+             "has no GLB: it would have too many bytes beside S_0's (scales.glb all writes it)");
+    made.erase(made.begin());
+  }
 }
 
 /// What rules of format/rules read of the planes.
 std::vector<TextureInfo> describe_planes(const Fragments& fragments) {
-  std::vector<TextureInfo> out(fragments.planes.size());
-  for (std::size_t p = 0; p < out.size(); ++p) {
-    const TexturePlane& plane = fragments.planes[p];
-    out[p].image = plane.image, out[p].mip = plane.mip, out[p].base = plane.base;
-    out[p].role = enum_name(plane.role);
+  std::vector<TextureInfo> out;
+  for (const TexturePlane& plane : fragments.planes) {
+    TextureInfo& t = out.emplace_back();
+    t.image = plane.image, t.mip = plane.mip, t.base = plane.base, t.role = enum_name(plane.role);
   }
   return out;
 }
@@ -624,39 +643,28 @@ GltfScales write_gltf_scales(const NestedScales& scales, const PerceptualValues&
                               surface_area(scales.mesh, scales.scales.front().triangles),
                               static_cast<double>(perceptual.object_height)};
   const GlbImages shown = named_previews(preview_images(fragments, previews));
-  std::map<std::string, WholeTexture> pictures;
   for (GlbBeside& glb : wanted) {
     glb.images = shown;
     for (const PlanePreview& p : previews.planes)
       glb.texture_px = std::max({glb.texture_px, p.width_px, p.height_px});
-    if (glb.up_to_px > 0 && !textures.empty()) choose_textures(object, fragments, glb, pictures);
+    if (glb.up_to_px > 0 && !textures.empty()) choose_textures(object, fragments, glb);
   }
-  GltfScales out;
-  for (const auto& [path, unused] : pictures) out.files.push_back({path, {}});
-  for (const GlbBeside& glb : wanted) out.files.push_back({gltf_scale_path(glb.scale->scale), {}});
-  parallel_each(context, out.files.size(), 1, [&](std::size_t k) {
-    GltfScales::File& file = out.files[k];
-    if (k < pictures.size()) {
-      const WholeTexture& t = pictures.at(file.path);
-      file.bytes = whole_plane(fragments.planes[t.plane], filled.at(t.plane),
-                               tables.planes[t.plane].rung_quality[t.rung]);
-      return;
-    }
-    const GlbBeside& glb = wanted[k - pictures.size()];
-    ScalesOptions enough = options;
-    if (glb.up_to_px > 0) enough.normal_bits = std::min(options.normal_bits, kNormalBitsBeside);
-    ScaleCoding lit{coding.mesh,
-                    enough,
-                    coding.position,
-                    {coding.uv[0], coding.uv[1]},
-                    {coding.write_uv[0], coding.write_uv[1]},
-                    coding.fine_colours,
-                    coding.tangents,
-                    {}};
-    if (glb.up_to_px > 0) coarsen_grids(lit, glb);
-    lit.frames = scale_frames(scales, static_cast<std::size_t>(glb.scale - scales.scales.data()), context);
-    file.bytes = write_scale(lit, *glb.scale, materials, glb.images).glb;
+  parallel_each(context, wanted.size(), 1, [&](std::size_t k) {
+    const auto row = static_cast<std::size_t>(wanted[k].scale - scales.scales.data());
+    wanted[k].file = code_beside(coding, wanted[k], materials, scale_frames(scales, row, context));
   });
+  GltfScales out;
+  if (options.glb == ScaleGlbs::kSteps) leave_out_finest(files, wanted, out.notes);
+  std::map<std::string, WholeTexture> pictures;
+  for (const GlbBeside& glb : wanted)
+    for (const WholeTexture& t : glb.pictures) pictures[gltf_image_path(t.plane, t.rung)] = t;
+  for (const auto& [path, unused] : pictures) out.files.push_back({path, {}});
+  parallel_each(context, out.files.size(), 1, [&](std::size_t k) {
+    const WholeTexture& t = pictures.at(out.files[k].path);
+    out.files[k].bytes = whole_plane(fragments.planes[t.plane], filled.at(t.plane),
+                                     tables.planes[t.plane].rung_quality[t.rung]);
+  });
+  for (GlbBeside& glb : wanted) out.files.push_back({gltf_scale_path(glb.scale->scale), std::move(glb.file)});
   return out;
 }
 

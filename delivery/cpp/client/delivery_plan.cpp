@@ -202,6 +202,7 @@ int coarsest_alike_scale(PackageReader& package, int scale, const DeliveryReques
                                        ? pair_values(*t, PerceptualStatistic::kAverage, ChainRule::kSurvivor)
                                        : pair_values(*t, PerceptualStatistic::kP95);
   const auto row = static_cast<std::size_t>(std::ranges::find(t->scale, scale) - t->scale.begin());
+  if (row == t->scale.size()) return scale;  // nothing is said of it
   const std::size_t most = refine_to(value, t->scale.size(), t->scale.size() - 1, row, request.jnd);
   for (const ManifestScale& s : package.manifest().scales)
     if (s.scale <= t->scale[most]) scale = std::max(scale, s.scale);

@@ -39,6 +39,7 @@ class GltfScalesOf : public ::testing::Test {
     quality_.table.geometry = {geometry};
     quality_.table.groups = {{PlaneGroup::kColour, {{{0.1f}, few, many, few, few}}}};
     files_ = c_.write_streamed();
+    files_.files.front().glb.resize(1 << 22);  // beside it there is room for all
   }
   GltfScales write(ScaleGlbs which, int threads = 1) const {
     ScalesOptions options;
@@ -74,6 +75,35 @@ TEST_F(GltfScalesOf, TheStepsBetweenTheEndsHaveAFile) {
   EXPECT_EQ(set_of(paths(write(ScaleGlbs::kSteps))), expected);
   EXPECT_EQ(set_of(paths(write(ScaleGlbs::kAll))), all);
   EXPECT_TRUE(write(ScaleGlbs::kEnds).files.empty());
+}
+
+TEST_F(GltfScalesOf, TheFinestGoUntilAllTakeTheirShareOfTheFinestScale) {
+  std::vector<std::size_t> sizes;  // of the steps' GLBs, finest first
+  double whole = 0;
+  for (const GltfScales::File& f : write(ScaleGlbs::kSteps).files)
+    if (f.path.ends_with(".glb")) sizes.push_back(f.bytes.size()), whole += static_cast<double>(sizes.back());
+  ASSERT_GE(sizes.size(), 2u);
+  files_.files.front().glb.resize(static_cast<std::size_t>(whole));
+  std::set<std::size_t> seen;
+  for (const double coarsest : {0.1, 0.5, 0.8, 1.0, 1.1, 1.2, 1.5}) {
+    files_.files.back().glb.resize(static_cast<std::size_t>(coarsest * whole));
+    std::size_t kept = sizes.size();
+    double sum = whole + static_cast<double>(files_.files.back().glb.size());
+    for (const std::size_t bytes : sizes) sum += static_cast<double>(bytes);
+    for (; kept > 0 && sum > kMostOverFinest * whole; --kept)
+      sum -= static_cast<double>(sizes[sizes.size() - kept]);
+    const GltfScales made = write(ScaleGlbs::kSteps);
+    std::vector<std::size_t> left;
+    for (const GltfScales::File& f : made.files)
+      if (f.path.ends_with(".glb")) left.push_back(f.bytes.size());
+    EXPECT_TRUE(std::ranges::equal(left, std::span(sizes).last(kept))) << coarsest;
+    EXPECT_EQ(made.notes.size(), sizes.size() - kept);
+    EXPECT_EQ(made.files.size(), kept + (kept > 0 ? 1 : 0)) << "a picture that no file shows";
+    EXPECT_TRUE(write(ScaleGlbs::kAll).notes.empty());
+    seen.insert(kept);
+  }
+  EXPECT_TRUE(seen.contains(0));
+  EXPECT_GE(seen.size(), 3u);
 }
 
 TEST_F(GltfScalesOf, FilesAreValidAndShowThePicture) {

@@ -27,6 +27,7 @@ export async function coarsestAlike(
   const kept = reader.manifest.scales.map((s) => s.scale);
   return (wanted) => {
     const row = chain.indexOf(wanted), pairs = row * (2 * n - row - 1) / 2 - row - 1; // of (row, 0)
+    if (row < 0) return wanted; // nothing is said of it
     let last = row;
     while (last + 1 < n && values[pairs + last + 1]! < jnd) ++last;
     return Math.max(wanted, ...kept.filter((k) => k <= chain[last]!));

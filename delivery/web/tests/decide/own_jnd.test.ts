@@ -28,6 +28,7 @@ describe('a JND of the viewer', () => {
     const all = await coarsestAlike({ reader, options: { jnd: 1 } });
     expect(scales.map(nothing)).toEqual(scales);
     expect(all(0)).toBe(scales.at(-1));
+    expect(all(77)).toBe(77); // no scale of the chain
   });
   it('needs a package with perceptual values', async () => {
     const reader = await PackageReader.openBytes(golden('v2.0-scan'), 'scan');
