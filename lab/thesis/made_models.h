@@ -27,7 +27,7 @@ struct PatternPlane {
 };
 PatternPlane pattern_plane(const std::vector<std::size_t>& patterns, std::uint32_t columns);
 /// Z, I and M alone: such planes lie on no mesh.
-inline constexpr ZimOptions kTexturePredictors{.weight_eta = 0};
+inline const ZimOptions kTexturePredictors{.weight_eta = 0};
 /// The tables of such a plane that is encoded at these qualities.
 LutTables plane_tables(const PatternPlane& plane, const std::vector<int>& rungs, const RunContext& context);
 

@@ -230,6 +230,7 @@ std::string provenance(const ModelSource& source, const CompileOptions& options)
   Json profile = profile_json(recorded);
   profile["package"].erase("annotations");
   if (options.atlas.mode == AtlasMode::kKeep) profile.erase("atlas");  // as before there was such a stage
+  if (options.zim.weights.empty()) profile["zim"].erase("weights");    // likewise
   return Json{{"version", 1},
               {"tool", "texmesh " + tool_version()},
               {"format", {{"major", kFormatMajor}, {"minor", 0}}},  // stage package knows the minor

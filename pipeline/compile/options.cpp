@@ -185,9 +185,11 @@ void check_options(const CompileOptions& o, const std::string& source) {
     throw InputError(source, "lut.quality_fine",
                      ">= lut.quality_coarse (" + option_text(o.lut.quality_coarse) + ")",
                      option_text(o.lut.quality_fine));
-  if (!(o.zim.weight_eta + o.zim.weight_z + o.zim.weight_i + o.zim.weight_m > 0))
-    throw InputError(source, "zim.weight_eta", "> 0, or weight_z, weight_i or weight_m > 0",
-                     option_text(o.zim.weight_eta));
+  try {
+    vqp_weight_sum(o.zim);
+  } catch (const StageError& e) {
+    throw InputError(source, "zim." + e.place(), e.expected(), e.found());
+  }
 }
 
 std::vector<OptionField> list_options(CompileOptions& options) {
