@@ -143,6 +143,7 @@ bool is_same_object(const T& candidate, const void* part, const std::type_info& 
 CompileOptions resolve_options(CompileOptions o) {
   // Of 12 scales of a saxophone and a site with new charts 11 come 2 to 6 % nearer to S_0 than at 1.
   constexpr double kSeamWeightOfNewCharts = 0.1;
+  constexpr int kCoarsestOfNewCharts = 220;  // some 500 triangles
   const auto is_default = [&](const char* path, const auto& value, const auto& fallback) {
     return value == fallback && !o.set_by_user.contains(path);
   };
@@ -157,6 +158,11 @@ CompileOptions resolve_options(CompileOptions o) {
     if (is_default("simplification.seam_weight", o.simplification.seam_weight,
                    SimplificationOptions{}.seam_weight))
       o.simplification.seam_weight = kSeamWeightOfNewCharts;
+    if (is_default("simplification.order", o.simplification.order, SimplificationOptions{}.order))
+      o.simplification.order = CollapseOrder::kTouching;
+    if (is_default("simplification.coarsest_vertices", o.simplification.coarsest_vertices,
+                   SimplificationOptions{}.coarsest_vertices))
+      o.simplification.coarsest_vertices = kCoarsestOfNewCharts;
     if (is_default("proxies.mode", o.proxies.mode, ProxiesOptions{}.mode))
       o.proxies.mode = ProxyMode::kAlways;
   }

@@ -312,6 +312,14 @@ bool CollapseEngine::retry_locked() {
   return !queue_.empty();
 }
 
+/// Order touching, where nothing else is left. False when that frees nothing, or has been done.
+bool CollapseEngine::let_surfaces_touch() {
+  if (options_.order != CollapseOrder::kTouching || ring_.surfaces_may_touch()) return false;
+  ring_.let_surfaces_touch();
+  given_up_at_ = static_cast<std::size_t>(-1);
+  return retry_locked();
+}
+
 CollapseStop CollapseEngine::run_to(std::uint32_t positions, int scale, const RunContext& context) {
   const bool thesis = options_.order == CollapseOrder::kThesis;
   constexpr int kRetries = 8;  // each costs a pass over all points; later ones free next to nothing
@@ -321,7 +329,7 @@ CollapseStop CollapseEngine::run_to(std::uint32_t positions, int scale, const Ru
     if (step % 4096 == 0) context.check_cancelled();
     if (mesh_.alive_faces() <= static_cast<std::uint32_t>(options_.min_triangles))
       return CollapseStop::kFewTriangles;
-    if (queue_.empty() && (++retries > kRetries || !retry_locked())) {
+    if (queue_.empty() && (++retries > kRetries || !retry_locked()) && !let_surfaces_touch()) {
       for (std::uint32_t p = 0; p < mesh_.point_count(); ++p)
         if (mesh_.is_alive(p) && flags_[p] & kTooFar) return CollapseStop::kTooFar;
       return CollapseStop::kLocked;

@@ -256,6 +256,7 @@ class CollapseEngine {
   void update_around(std::uint32_t v);
   void remove_component(std::uint32_t component);
   bool retry_locked();
+  bool let_surfaces_touch();
 
   const SimplificationOptions& options_;
   CollapseMesh mesh_;

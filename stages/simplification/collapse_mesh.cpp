@@ -297,7 +297,7 @@ bool CollapseRing::map_wedges(std::uint32_t slot, WedgeMap& map) const {
       return false;
     }
   }
-  if (count < wedges_.size() && count < 2 && n.valence == usual_valence_) return false;
+  if (count < wedges_.size() && count < 2 && n.valence == usual_valence_ && !may_touch_) return false;
   if ((mesh_.is_multiple(centre_) || mesh_.is_multiple(n.point)) && !positions_agree(n)) return false;
   map.slot = slot;
   return true;
@@ -313,7 +313,7 @@ bool CollapseRing::positions_agree(const Neighbour& n) const {
       if (to != kNone && to != target) return false;
       to = target;
     }
-    if (to == kNone) return false;
+    if (to == kNone && !may_touch_) return false;
   }
   return true;
 }
@@ -321,7 +321,7 @@ bool CollapseRing::positions_agree(const Neighbour& n) const {
 std::uint32_t CollapseRing::destination(const Neighbour& n, std::uint32_t position) const {
   for (std::uint32_t i = 0; i < n.pairs; ++i)
     if (mesh_.wedge_position(wedges_[n.pair[i].from]) == position) return mesh_.wedge_position(n.pair[i].to);
-  return kNone;
+  return may_touch_ ? mesh_.members(n.point)[0] : kNone;
 }
 
 bool CollapseRing::keeps_topology(std::uint32_t slot) {
@@ -340,19 +340,20 @@ bool CollapseRing::keeps_topology(std::uint32_t slot) {
       const std::uint32_t x = face.point[(entry % 4 + k) % 3];
       if (x == centre_ || mark_[x].stamp != now_) continue;
       Neighbour& n = neighbours_[mark_[x].slot];
-      if (n.faces == 0) return false;
+      if (n.faces == 0 && !may_touch_) return false;
       ++n.far_valence;
       ++met;
     }
     closes = closes || met == 2;
   }
   for (const Neighbour& n : neighbours_) {
-    if (n.faces == 0) continue;
+    if (n.far_valence == 0) continue;
     const std::uint32_t both = n.valence + n.far_valence, left = both - 2 * n.faces;
-    if (left < 1 || left > std::max(n.valence, n.far_valence)) return false;
+    const std::uint32_t most = may_touch_ ? kMaxValence : std::max(n.valence, n.far_valence);
+    if (left > most || (left < 1 && !(may_touch_ && mesh_.corner_count(n.point) > n.faces))) return false;
   }
   if (!keeps_positions(slot)) return false;
-  if (!closes) return true;
+  if (!closes || may_touch_) return true;
   for (const Corner& c : corners_) {  // a face of u that would repeat a face of v
     if (c.a == slot || c.b == slot || neighbours_[c.a].faces == 0 || neighbours_[c.b].faces == 0) continue;
     const std::uint32_t a = neighbours_[c.a].point, b = neighbours_[c.b].point;

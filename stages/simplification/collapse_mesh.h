@@ -133,7 +133,8 @@ class CollapseMesh {
 class CollapseRing {
  public:
   static constexpr std::uint32_t kNone = kNoIndex;
-  static constexpr std::uint32_t kMaxValence = 4;  // faces at an edge; an edge with more locks
+  // Faces at an edge; an edge with more locks. The second is for surfaces that may touch.
+  static constexpr std::uint32_t kUsualMaxValence = 4, kMaxValence = 8;
   /// `from`: index into wedges(); `to`: wedge of the neighbour.
   struct Pair {
     std::uint32_t from = 0, to = 0;
@@ -167,17 +168,23 @@ class CollapseRing {
   const std::vector<Neighbour>& neighbours() const { return neighbours_; }
   const std::vector<std::uint32_t>& wedges() const { return wedges_; }
 
+  /// From now on, in the four questions below, surfaces may touch: a tunnel may close to a line, lines may
+  /// end anywhere, and wedges that are not beside the edge keep their attributes.
+  void let_surfaces_touch() { may_touch_ = true; }
+  bool surfaces_may_touch() const { return may_touch_; }
+
   /// Borders and non-manifold lines shrink along themselves only; where they end, meet or change they stay.
   bool allowed_by_borders(const Neighbour& n) const {
-    if (n.valence > kMaxValence) return false;
-    if (odd_edges_ == 0) return true;
+    if (n.valence > (may_touch_ ? kMaxValence : kUsualMaxValence)) return false;
+    if (odd_edges_ == 0 || may_touch_) return true;
     return odd_edges_ == 2 && !odd_mixed_ && n.valence == odd_valence_;
   }
   /// Fills `map` from the faces that the collapse into the neighbour removes. False, and `map` for no
   /// neighbour, when not every wedge is mapped to one wedge. A junction of charts may move along a seam or
   /// border all the same; the wedges of charts that are not beside the edge then keep their attributes.
   bool map_wedges(std::uint32_t slot, WedgeMap& map) const;
-  /// The position of the neighbour's group that a position of the centre's group goes to.
+  /// The position of the neighbour's group that a position of the centre's group goes to: where surfaces
+  /// touch, the group's first for one that is not beside the edge.
   std::uint32_t destination(const Neighbour& n, std::uint32_t position) const;
   /// The link condition on the welded surface, twins as one: no new non-manifold edge, no new hole, nothing
   /// vanishes.
@@ -204,7 +211,7 @@ class CollapseRing {
   // Edges that are not inside a surface of two faces per edge (or of four where two sheets lie on each
   // other):
   std::uint32_t odd_edges_ = 0, odd_valence_ = 0, usual_valence_ = 2;
-  bool odd_mixed_ = false;
+  bool odd_mixed_ = false, may_touch_ = false;
 };
 
 }  // namespace texmesh

@@ -8,10 +8,10 @@ namespace texmesh {
 
 inline constexpr int kSimplificationVersion = 12;
 
-enum class CollapseOrder : std::uint8_t { kTexmesh, kThesis };
+enum class CollapseOrder : std::uint8_t { kTexmesh, kThesis, kTouching };
 template <>
 struct EnumNames<CollapseOrder> {
-  static constexpr std::array<std::string_view, 2> names{"texmesh", "thesis"};
+  static constexpr std::array<std::string_view, 3> names{"texmesh", "thesis", "touching"};
 };
 
 struct SimplificationOptions {
@@ -42,7 +42,8 @@ struct SimplificationOptions {
   int coarsest_vertices = 400;
   static void fields(auto& s, auto&& v) {
     v("order", s.order, ProfileOnly{},
-      "texmesh = quadrics weighted by persistence; thesis = scale map, closest neighbour");
+      "texmesh = quadrics weighted by persistence; thesis = scale map, closest neighbour; touching = as texmesh, but "
+      "where no collapse is left tunnels close, and borders and seams move");
     v("persistence_weight", s.persistence_weight, Range{0, 10}, ProfileOnly{},
       "cost of removing a vertex grows by this per scale it persists; 0 = quadrics alone");
     v("uv_weight", s.uv_weight, Range{0, 10}, ProfileOnly{},
@@ -71,6 +72,9 @@ struct SimplificationOptions {
 ///   in every set of texture coordinates that its material uses. The set of the base colour has the quadric
 ///   and max_shift.
 /// - Order thesis removes down to the scale map's numbers, whatever the error and the shift of the texture.
+/// - Order touching collapses as texmesh does until nothing is left. From then on surfaces may touch in
+/// points
+///   and lines, and double sheets without thickness may vanish. Positions that stay keep a triangle.
 /// - Border vertices move along the border only, seams along the seam, twins together. Borders of materials
 ///   are seams; where parts of one material share wedges, what shows is one surface and nothing is held.
 /// About 5 us per removed vertex on one core. StageError when the scale map is of another mesh.

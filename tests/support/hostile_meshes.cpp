@@ -1,5 +1,8 @@
 #include "tests/support/hostile_meshes.h"
 
+#include <array>
+#include <map>
+
 #include <utility>
 
 namespace texmesh::testing {
@@ -46,6 +49,42 @@ Mesh dust(int count, float side) {
     for (Vec3f corner : {Vec3f{0, 0, 0}, Vec3f{1, place(), 0}, Vec3f{place(), 1, 1}})
       points.push_back(at + corner * s);
     triangles.push_back({first, first + 1, first + 2});
+  }
+  return bare_mesh(std::move(points), std::move(triangles));
+}
+
+Mesh sieve(int n) {
+  const auto solid = [n](std::array<int, 3> at) {
+    return at[0] >= 0 && at[0] < n && at[1] >= 0 && at[1] < n && at[2] == 0 && !(at[0] % 2 && at[1] % 2);
+  };
+  std::vector<Vec3f> points;
+  std::vector<Triangle> triangles;
+  std::map<std::array<int, 3>, std::uint32_t> numbers;
+  const auto number = [&](std::array<int, 3> at) {
+    const auto [it, fresh] = numbers.try_emplace(at, static_cast<std::uint32_t>(points.size()));
+    if (fresh)
+      points.push_back({static_cast<float>(at[0]), static_cast<float>(at[1]), static_cast<float>(at[2])});
+    return it->second;
+  };
+  for (int cell = 0; cell < n * n; ++cell) {
+    const std::array<int, 3> at{cell % n, cell / n, 0};
+    if (!solid(at)) continue;
+    for (std::size_t axis = 0; axis < 3; ++axis)
+      for (const int side : {0, 1}) {
+        std::array<int, 3> beyond = at;
+        beyond[axis] += side ? 1 : -1;
+        if (solid(beyond)) continue;
+        std::array<std::uint32_t, 4> corner;
+        for (std::size_t k = 0; k < 4; ++k) {
+          std::array<int, 3> p = at;
+          p[axis] += side;
+          p[(axis + 1) % 3] += k == 1 || k == 2;
+          p[(axis + 2) % 3] += k >= 2;
+          corner[side ? k : 3 - k] = number(p);
+        }
+        triangles.push_back({corner[0], corner[1], corner[2]});
+        triangles.push_back({corner[0], corner[2], corner[3]});
+      }
   }
   return bare_mesh(std::move(points), std::move(triangles));
 }

@@ -22,6 +22,10 @@ Mesh sliver_sheet(int n);
 /// `count` triangles without a common point, of side `side` at most, in the unit cube; the first is larger.
 Mesh dust(int count, float side);
 
+/// A closed slab of n x n x 1 cubes without those of odd row and column: as many tunnels, each a cube wide.
+/// No UVs.
+Mesh sieve(int n);
+
 /// Appends a copy of every triangle.
 void repeat_triangles(Mesh& m);
 

@@ -98,6 +98,8 @@ TEST(Options, NewChartsHaveDefaultsOfTheirOwn) {
   EXPECT_EQ(resolve_options(o).proxies.mode, ProxyMode::kAuto);
   o.atlas.mode = AtlasMode::kRebuild;
   EXPECT_EQ(resolve_options(o).simplification.seam_weight, 0.1);
+  EXPECT_EQ(resolve_options(o).simplification.order, CollapseOrder::kTouching);
+  EXPECT_EQ(resolve_options(o).simplification.coarsest_vertices, 220);
   EXPECT_EQ(resolve_options(o).proxies.mode, ProxyMode::kAlways);
   EXPECT_EQ(resolve_options(o).ladder.uncovered, Uncovered::kKept);
   EXPECT_EQ(write_profile(resolve_options(resolve_options(o))), write_profile(resolve_options(o)));

@@ -2,12 +2,15 @@
 
 #include <gtest/gtest.h>
 
+#include <map>
+
 #include "stages/base/run_context.h"
 #include "stages/charts/texture_frame.h"
 #include "stages/condition/condition.h"
 #include "stages/geometry/mesh_topology.h"
 #include "stages/image/decode_image.h"
 #include "stages/image/png_writer.h"
+#include "stages/simplification/simplification.h"
 #include "tests/support/hostile_meshes.h"
 #include "tests/support/meshes.h"
 
@@ -168,6 +171,47 @@ TEST(Atlas, MaterialsThatDifferInImagesAloneBecomeOne) {
   expect_same_surface(plain);
   EXPECT_EQ(plain.made.materials.size(), 2u);
   EXPECT_EQ(plain.made.images.size(), 1u);
+}
+
+/// A sphere whose triangles lie in `charts` charts of one row of quads or part of it, each in a cell of its
+/// own.
+Mesh in_charts(const Mesh& from, std::uint32_t charts) {
+  Mesh out = from;
+  out.wedge_position.clear(), out.uv0.clear(), out.normals.clear();
+  std::map<std::array<std::uint32_t, 2>, std::uint32_t> ids;
+  const auto columns = static_cast<std::uint32_t>(std::ceil(std::sqrt(double(charts))));
+  for (std::uint32_t t = 0; t < from.triangles.size(); ++t) {
+    const auto chart = static_cast<std::uint32_t>(std::uint64_t{t} * charts / from.triangles.size());
+    for (std::uint32_t& w : out.triangles[t]) {
+      const auto [at, fresh] =
+          ids.try_emplace({w, chart}, static_cast<std::uint32_t>(out.wedge_position.size()));
+      const std::uint32_t old = std::exchange(w, at->second);
+      if (!fresh) continue;
+      out.wedge_position.push_back(from.wedge_position[old]);
+      const Vec2f cell{float(chart % columns), float(chart / columns)};
+      out.uv0.push_back((cell + from.uv0[old] * 0.9f) * (1 / float(columns)));
+    }
+  }
+  return out;
+}
+
+TEST(Atlas, TheCoarsestScaleIsSmallForAnyNumberOfCharts) {
+  for (const std::uint32_t charts : {20u, 300u, 1000u, 5000u}) {
+    const Charted c =
+        charted(in_charts(testing::bumpy_sphere(60, 90), charts), {data_material(0)}, {places(256)});
+    ScaleMap map;
+    map.scales = 12;
+    testing::Random random{charts};
+    for (std::size_t p = 0; p < c.made.mesh.mesh.positions.size(); ++p)
+      map.persistence.push_back(static_cast<std::uint8_t>(random.next() % 13));
+    SimplificationOptions options;
+    options.order = CollapseOrder::kTouching;
+    options.seam_weight = 0.1;
+    options.coarsest_vertices = 220;
+    const NestedScales scales = simplify(c.made.mesh, map, options, RunContext{});
+    EXPECT_LE(scales.scales.back().triangles.size(), 600u) << charts;
+    EXPECT_GE(scales.scales.size(), 4u) << charts;
+  }
 }
 
 TEST(Atlas, KeepsWhatItCannotOrNeedNotRebuild) {

@@ -14,6 +14,7 @@
 #include "stages/scales/scales.h"
 #include "stages/simplification/simplification.h"
 #include "tests/format/split/split_fixture.h"
+#include "tests/support/hostile_meshes.h"
 #include "tests/support/meshes.h"
 
 namespace texmesh::vertex_split_test {
@@ -26,7 +27,7 @@ using testing::SplitEdges;
 
 const RunContext kOneThread{};
 
-NestedScales simplified(const Mesh& mesh, int scales = 10) {
+NestedScales simplified(const Mesh& mesh, int scales = 10, CollapseOrder order = CollapseOrder::kTexmesh) {
   const ConditionedMesh conditioned = condition_mesh(mesh, false, {}, kOneThread);
   ScaleMap map;
   map.scales = scales;
@@ -37,6 +38,7 @@ NestedScales simplified(const Mesh& mesh, int scales = 10) {
     map.persistence.push_back(static_cast<std::uint8_t>(i));
   }
   SimplificationOptions options;
+  options.order = order;
   options.min_triangles = 10;
   return simplify(conditioned, map, options, kOneThread);
 }
@@ -83,8 +85,9 @@ Corners corners_of(const NestedScales& scales, const NestedScale& scale, const V
 }
 
 /// Every kept scale decodes to its own triangles; every block leaves a mesh with three points per face and no
-/// more borders or non-manifold edges than the coarser and finer of the scales around it.
-void expect_stream(const NestedScales& scales, const std::vector<std::size_t>& kept) {
+/// more borders or non-manifold edges than the coarser and finer of the scales around it, unless surfaces
+/// touch.
+void expect_stream(const NestedScales& scales, const std::vector<std::size_t>& kept, bool touching) {
   const VertexSplitCoding coding = coding_of(scales.mesh);
   SplitSource source = make_vertex_splits(scales, kept, coding, kOneThread);
   source.splits_per_block = 40;
@@ -101,7 +104,7 @@ void expect_stream(const NestedScales& scales, const std::vector<std::size_t>& k
     const SplitMesh& mesh = reader.mesh();
     for (std::uint32_t f = 0; f < mesh.face_count(); ++f)
       for (std::uint32_t k = 0; k < 3; ++k) ASSERT_NE(mesh.point_at(f, k), mesh.point_at(f, k + 1));
-    if (!b.is_patch) {
+    if (!b.is_patch && !touching) {
       const SplitEdges edges = count_split_edges(mesh);
       EXPECT_LE(edges.border, most.border);
       EXPECT_LE(edges.non_manifold, most.non_manifold);
@@ -115,12 +118,12 @@ void expect_stream(const NestedScales& scales, const std::vector<std::size_t>& k
   }
 }
 
-void expect_stream(const NestedScales& scales) {
+void expect_stream(const NestedScales& scales, bool touching = false) {
   std::vector<std::size_t> all, some{0};
   for (std::size_t k = 0; k < scales.scales.size(); ++k) all.push_back(k);
   for (std::size_t k = 3; k < scales.scales.size(); k += 3) some.push_back(k);
-  expect_stream(scales, all);
-  expect_stream(scales, some);
+  expect_stream(scales, all, touching);
+  expect_stream(scales, some, touching);
 }
 
 TEST(VertexSplit, ClosedSurfaceWithSeamAndNormals) {
@@ -209,6 +212,11 @@ TEST(VertexSplit, NonManifoldSpineAndDoubledSheets) {
     doubled.triangles.push_back({doubled.triangles[t][0], doubled.triangles[t][2], doubled.triangles[t][1]});
   doubled.triangle_material.resize(2 * n), doubled.triangle_part.resize(2 * n);
   expect_stream(simplified(doubled));
+}
+
+TEST(VertexSplit, SurfacesThatTouch) {
+  for (const Mesh& mesh : {testing::sieve(15), open_book(), many_charts()})
+    expect_stream(simplified(mesh, 10, CollapseOrder::kTouching), true);
 }
 
 /// As if whole components had vanished: their faces leave the coarser scales without a collapse.

@@ -63,8 +63,9 @@ inline double uv_turn(const Mesh& m, const Triangle& t) {
 }
 
 /// What holds for every result: nested positions, no new UV, no degenerate triangle, no crack, sound
-/// bookkeeping. `flat`: the error may be nothing.
-inline void expect_sound(const NestedScales& scales, bool flat = false) {
+/// bookkeeping. `flat`: the error may be nothing; `touching`: there may be more borders, and edges of many
+/// faces.
+inline void expect_sound(const NestedScales& scales, bool flat = false, bool touching = false) {
   ASSERT_FALSE(scales.scales.empty());
   const Mesh& m = scales.mesh;
   EXPECT_EQ(scales.scales[0].scale, 0);
@@ -112,8 +113,8 @@ inline void expect_sound(const NestedScales& scales, bool flat = false) {
     for (std::uint32_t p : used) EXPECT_FALSE(removed.count(p));
     finer = used;
     const EdgeCounts counts = count_edges(scales, s);
-    EXPECT_LE(counts.border, input.border) << "scale " << s.scale;
-    EXPECT_LE(counts.non_manifold, input.non_manifold) << "scale " << s.scale;
+    EXPECT_TRUE(touching || counts.border <= input.border) << "scale " << s.scale;
+    EXPECT_TRUE(touching || counts.non_manifold <= input.non_manifold) << "scale " << s.scale;
     EXPECT_TRUE(k == 0 || s.error_max > 0 || flat);
     EXPECT_LE(s.error_rms, s.error_max);
   }

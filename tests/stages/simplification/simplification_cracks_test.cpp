@@ -6,6 +6,7 @@
 
 #include "stages/simplification/simplification.h"
 #include "tests/stages/simplification/simplification_checks.h"
+#include "tests/support/hostile_meshes.h"
 
 namespace texmesh::simplification_cracks_test {
 
@@ -58,17 +59,28 @@ Mesh wounded(const Mesh& whole, const Wounds& wounds) {
 void expect_whole(const Mesh& mesh, double left, const char* name) {
   SCOPED_TRACE(name);
   const ConditionedMesh conditioned = condition(mesh);
-  for (CollapseOrder order : {CollapseOrder::kTexmesh, CollapseOrder::kThesis}) {
+  for (CollapseOrder order : {CollapseOrder::kTexmesh, CollapseOrder::kThesis, CollapseOrder::kTouching}) {
     SimplificationOptions options;
     options.order = order;
     const NestedScales scales = run(conditioned, options);
-    expect_sound(scales);
+    expect_sound(scales, false, order == CollapseOrder::kTouching);
     ASSERT_GT(scales.scales.size(), 1u);
-    if (order == CollapseOrder::kTexmesh) {
+    if (order != CollapseOrder::kThesis) {
       EXPECT_LT(static_cast<double>(scales.scales.back().triangles.size()),
                 left * static_cast<double>(mesh.triangles.size()));
     }
   }
+}
+
+TEST(SimplificationCracks, TunnelsCloseWhereSurfacesMayTouch) {
+  const ConditionedMesh mesh = condition(sieve(21));
+  const NestedScales strict = run(mesh), touching = run(mesh, {.order = CollapseOrder::kTouching});
+  expect_sound(strict);
+  expect_sound(touching, false, true);
+  EXPECT_GT(strict.scales.back().triangles.size(), 1000u);  // 100 tunnels take 10 or more each
+  EXPECT_LT(touching.scales.back().triangles.size(), 300u);
+  // As long as a collapse is left that keeps the surface, nothing touches.
+  EXPECT_EQ(touching.scales[1].triangles, strict.scales[1].triangles);
 }
 
 TEST(SimplificationCracks, FragmentedAtlas) {
