@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 
 #include <charconv>
+#include <cmath>
+#include <limits>
 #include <nlohmann/json.hpp>
 
 #include "format/base/text_bytes.h"
@@ -490,6 +492,18 @@ void add_method_options(Command& c, SimulateArguments& a) {
   add_rule_option(c, a);
 }
 
+/// An option whose value lies from `least` to `most`, as `range` says.
+Option bounded_option(Command& c, const std::string& flag, auto parse, double least, double most,
+                      const char* range, double& value, const std::string& help, const char* unit) {
+  return c.option(
+      flag,
+      [=, &value](const std::string& text) {
+        value = static_cast<double>(parse(text, flag));
+        if (!(value >= least && value <= most)) throw UsageError(flag, "", range, text);
+      },
+      help, unit);
+}
+
 void add_probe_options(Command& c, ProbeOptions& probe) {
   c.group("Test packets");
   c.choice(
@@ -497,32 +511,14 @@ void add_probe_options(Command& c, ProbeOptions& probe) {
        "Test packets beside the textures, which measure the link and cost a part of it: fixed = of one size at "
        "regular intervals; adaptive = half as large and as frequent below a threshold, twice from it on")
       .shows_default("off");
-  c.option(
-       "--probe-size",
-       [&probe](const std::string& text) {
-         probe.packet_bytes = static_cast<double>(parse_bytes(text, "--probe-size"));
-         if (!(probe.packet_bytes >= 64 && probe.packet_bytes <= 1 << 24))
-           throw UsageError("--probe-size", "", "64 B to 16 MiB", text);
-       },
-       "A test packet, of adaptive ones the first: 64 B to 16 MiB", "BYTES")
+  bounded_option(c, "--probe-size", parse_bytes, 64, 1 << 24, "64 B to 16 MiB", probe.packet_bytes,
+                 "A test packet, of adaptive ones the first: 64 B to 16 MiB", "BYTES")
       .shows_default("8kB");
-  c.option(
-       "--probe-interval",
-       [&probe](const std::string& text) {
-         probe.interval_s = parse_duration(text, "--probe-interval");
-         if (!(probe.interval_s >= 0.01 && probe.interval_s <= 3600))
-           throw UsageError("--probe-interval", "", "10 ms to an hour", text);
-       },
-       "From one test packet to the next: 10 ms to an hour", "TIME")
+  bounded_option(c, "--probe-interval", parse_duration, 0.01, 3600, "10 ms to an hour", probe.interval_s,
+                 "From one test packet to the next: 10 ms to an hour", "TIME")
       .shows_default("500ms");
-  c.option(
-       "--probe-threshold",
-       [&probe](const std::string& text) {
-         probe.threshold_bytes_s = parse_bandwidth(text, "--probe-threshold");
-         if (!(probe.threshold_bytes_s > 0))
-           throw UsageError("--probe-threshold", "", "a rate above 0", text);
-       },
-       "The threshold of adaptive test packets", "RATE")
+  bounded_option(c, "--probe-threshold", parse_bandwidth, std::numeric_limits<double>::min(), HUGE_VAL,
+                 "a rate above 0", probe.threshold_bytes_s, "The threshold of adaptive test packets", "RATE")
       .shows_default("1Mbit/s");
 }
 

@@ -14,8 +14,7 @@ namespace {
 
 constexpr std::uint32_t kPatternColumns = 6;
 
-Exhibit figure_8_2(const PatternPlane& all, const RunContext& context) {
-  const PlanePredictors p = predict_quality(all.fragments, all.pixels, kTexturePredictors, context).planes[0];
+Exhibit figure_8_2(const PatternPlane& all, const PlanePredictors& p) {
   Table table{"Predictors of 24 patterns", {}};
   add_columns(table, 0, {"pattern"});
   add_columns(table, 3, {"Z", "I", "zeta", "M", "ZIM"});
@@ -56,9 +55,8 @@ Exhibit figure_8_2(const PatternPlane& all, const RunContext& context) {
         write_png(sheet)}}};
 }
 
-Exhibit figure_8_3(const PatternPlane& all, const RunContext& context) {
+Exhibit figure_8_3(const PatternPlane& all, const PlanePredictors& p) {
   constexpr std::uint8_t kGreyOfThesis = 200;
-  const PlanePredictors p = predict_quality(all.fragments, all.pixels, kTexturePredictors, context).planes[0];
   const TexturePlane& plane = all.fragments.planes[0];
   Pixels map{plane.width_px, plane.height_px, 1, differing_texels(plane, all.pixels[0], kTexturePredictors)};
   Table table{"zeta, and the share of texels that the picture marks",
@@ -232,11 +230,11 @@ std::vector<Exhibit> predictor_exhibits(const RunContext& context) {
   std::vector<std::size_t> patterns(kMadePatterns);
   std::iota(patterns.begin(), patterns.end(), std::size_t{0});
   const PatternPlane all = pattern_plane(patterns, kPatternColumns);
+  const PlanePredictors p = predict_quality(all.fragments, all.pixels, kTexturePredictors, context).planes[0];
   const PatternPlane four =
       pattern_plane({pattern_of('x'), pattern_of('q'), pattern_of('j'), pattern_of('c')}, 2);
   const LutTables made = plane_tables(four, {5, 10, 20, 30, 40, 50, 60, 70, 80, 90, 95}, context);
-  return {figure_8_2(all, context), figure_8_3(all, context), figure_8_4(made),
-          figure_8_5(four, made, context)};
+  return {figure_8_2(all, p), figure_8_3(all, p), figure_8_4(made), figure_8_5(four, made, context)};
 }
 
 }  // namespace texmesh

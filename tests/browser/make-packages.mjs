@@ -27,6 +27,8 @@ const kPackages = {
   proxied: {scan: ['--triangles', '30000', '--texture', '1024', '--charts', '30'], options: ['--rungs', '20,50,85'], proxies: [[300, 64], [2000, 128]]},
   // The thesis as printed.
   printed: {scan: ['--triangles', '4000', '--texture', '1024', '--charts', '12'], options: ['--profile', 'thesis', '--rungs', '10,30,60,90']},
+  // All of the thesis's scales, a GLB each.
+  chain: {scan: ['--triangles', '4000', '--texture', '256', '--charts', '8'], options: ['--profile', 'thesis', '--jnd', '0.02', '--rungs', '20,85']},
   // Whose it is, in words that a page must not take for markup.
   told: {
     scan: ['--triangles', '1500', '--texture', '256', '--charts', '6'], options: ['--rungs', '20,85'],

@@ -131,7 +131,7 @@ test('export: levels of detail in three.js', async () => {
   });
 }, {seconds: 90});
 
-for (const [name, least] of [['maps', 2], ['printed', 4]]) {
+for (const [name, least] of [['maps', 2], ['chain', 12]]) {
   test(`unpack: GLBs of the scales of ${name} open in three.js by their URLs`, async () => {
     fs.mkdirSync(published, {recursive: true});
     const package_ = path.join(packages, `${name}.texmesh`), tree = path.join(published, `tree-${name}`);
@@ -147,7 +147,7 @@ for (const [name, least] of [['maps', 2], ['printed', 4]]) {
       for (const file of [...files, ...ends]) {
         const r = await page.evaluate((u) => window.door.glb(u), `${base}/out/tree-${name}/${file}`);
         const {triangles} = scales.find(({scale}) => scale === Number(/\d+/.exec(file)[0]));
-        check(r.triangles <= triangles && r.triangles > 0.95 * triangles, `${file}: ${r.triangles} triangles, the scale has ${triangles}`);
+        check(r.triangles <= triangles && r.triangles > 0.89 * triangles, `${file}: ${r.triangles} triangles, the scale has ${triangles}`);
         check(r.images === images, `${file}: ${r.images} images of ${images}`);
         check(r.covered > 10000, `${file}: nothing is drawn`);
         await shot(page, `tree-${name}-${path.basename(file, '.glb')}`);

@@ -9,7 +9,7 @@ const loader = () => new GLTFLoader().setDRACOLoader(new DRACOLoader().setDecode
 
 let stage;
 function start() {
-  const renderer = new WebGLRenderer({antialias: true, preserveDrawingBuffer: true});
+  const renderer = stage?.renderer ?? new WebGLRenderer({antialias: true, preserveDrawingBuffer: true}); // browsers hold sixteen at most
   renderer.setSize(kSize, kSize);
   document.body.replaceChildren(renderer.domElement);
   const scene = new Scene();

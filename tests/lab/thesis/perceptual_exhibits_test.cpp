@@ -26,6 +26,8 @@ TEST(PerceptualExhibits, Table71HasPrintedAndMeasuredSteps) {
     faces = number_at(e, 0, k, 3);
     EXPECT_LE(number_at(e, 0, k, 9), number_at(e, 0, k, 5)) << "least";
     EXPECT_GE(number_at(e, 0, k, 8), number_at(e, 0, k, 5)) << "largest";
+    EXPECT_GT(number_at(e, 0, k, 10), 0) << "by the quadric error";
+    EXPECT_LT(number_at(e, 0, k, 10), 0.5);
   }
   EXPECT_EQ(number_at(e, 0, 3, 4), 0.0468);
 }
