@@ -10,7 +10,7 @@
 
 namespace texmesh {
 
-inline constexpr int kQualityVersion = 21;
+inline constexpr int kQualityVersion = 22;
 
 struct QualityOptions {
   int views = 4;
@@ -69,8 +69,8 @@ struct QualityOptions {
 /// - Geometry: at the least size all scales are rendered; at the half those that still pass, every second
 ///   other one and the coarsest; at the largest those that still pass, the finest and the coarsest. The
 ///   others follow by the ratio to the size below, linear between the neighbours in the list of scales. Of
-///   models of few texels and triangles, those that no longer pass have half the views, and only the coarsest
-///   is rendered at the largest size.
+///   models of few texels and triangles, those that no longer pass have half the views, and grow from the
+///   half to the largest size as enlarge() has it.
 /// - Groups: one group's planes are coded, the others have the source's texels. At the least size
 ///   `rung_samples` of the ladder are rendered, first and last among them, and planes without coding: those
 ///   that are shown, up to 4 levels finer and 2 coarser; of full size the source's rung, where there is one.
@@ -80,13 +80,14 @@ struct QualityOptions {
 ///   at the size below, by GroupCurve::kLossPerDoubling where texels are larger on the screen, and by the
 ///   ratio to it where both were rendered; a highest rung that was not has a ratio of 1. Each size has the
 ///   knots of the others that lie far from its own: mips have few rungs. Of a model with a sampler that reads
-///   level 0 alone, all of this is rendered at every size. Planes are those that a client shows at the size
-///   (format/rules/viewing.h). Planes of one group have the rung whose quality is nearest to that of the
+///   level 0 alone, all of this is rendered at every size. The largest size of a model of few texels and
+///   triangles has the lowest rung and a coarser level alone. Planes are those that a client shows at the
+///   size (format/rules/viewing.h). Planes of one group have the rung whose quality is nearest to that of the
 ///   group's first plane. FLIP of knots is scaled so that the mean over fragments of GroupCurve::coded() is
 ///   what was measured for whole planes.
 /// - Exponent and error: of samples with all groups changed, on S_0 and on coarser scales, with the lowest
 ///   rung, the coarsest mips or the previews, 7 at the least size and 1 at the half, the exponent that
-///   predicts best.
+///   predicts best. Of models of few texels and triangles, what was fitted over many of these.
 /// - Where S_0 covers next to nothing of the pictures (a scan and a stray triangle a thousand times its size
 ///   away), they show the place in which nearly all positions lie, and a warning says what they leave out.
 ///   Heights are then that place's.

@@ -80,9 +80,6 @@ void take_off(double mips, double exponent, TextureLosses& losses) {
     flip[i] = std::max(flip[i], flip[i + 1] * (losses.texel_dssim[i] / losses.texel_dssim[i + 1]));
 }
 
-// Of the growth to one height, what is left to the next. Geometry of saxophone, turtle, helmet and small
-// models: .5 to .9 (of 256 to 512 beside 512 to 1024 px); previews: .3 to .7.
-constexpr double kGeometryGrows = 0.6, kPreviewGrows = 0.5;
 // Coarser mips lose 1.5 times as much at twice the height where texels are as large as pixels, 1.18 times
 // where they are twice as large (a model of 2,000 triangles and 512 px; flight helmet 1.5).
 constexpr double kMipGrowth = 0.48, kMipGrowthLeft = 0.4;
@@ -93,19 +90,6 @@ void scale(PictureLosses& losses, double factor) {
     const double by = list == &PictureLosses::dssim ? kSmoother : factor;
     for (float& v : losses.*list) v = static_cast<float>(std::min(1.0, static_cast<double>(v) * by));
   }
-}
-
-/// Grown by `part` of the growth from the smaller size, element by element.
-PictureLosses enlarged(const PictureLosses& from, const PictureLosses& smaller, double part) {
-  PictureLosses out = from;
-  for (const auto list : {&PictureLosses::flip, &PictureLosses::flip_p95})
-    for (std::size_t i = 0; i < from.size(); ++i) {
-      const auto now = static_cast<double>((from.*list)[i]), before = static_cast<double>((smaller.*list)[i]);
-      const double grown = before > 0 ? std::clamp(now / before, 1.0, 2.0) : 1;
-      (out.*list)[i] = static_cast<float>(std::min(1.0, now * (1 + part * (grown - 1))));
-    }
-  for (float& v : out.dssim) v = static_cast<float>(static_cast<double>(v) * kSmoother);
-  return out;
 }
 
 /// Of the least size, and of all where nothing follows from it.
@@ -347,6 +331,7 @@ using TogetherTextures = std::array<Replaced, 3>;
 
 TogetherTextures add_group(const TextureSampler& sampler, std::size_t rank, const Display& display,
                            const PlanesOfGroup& planes, bool few, GroupCells& group, SizeShots& shots) {
+  const bool follows = few && follows_below(sampler, rank);
   group.knots = sample_knots(sampler.data, planes, sampler.rung_samples, display);
   group.texel_level = texel_level(sampler.data, planes, display);
   const std::size_t knots = group.knots.size();
@@ -362,8 +347,9 @@ TogetherTextures add_group(const TextureSampler& sampler, std::size_t rank, cons
   }
   group.preview.resize(1);
   const Replaced preview = shots.previews(planes);
-  shots.take(0, preview, group.preview[0], coded_views(rank, few));
-  const MipSamples mips = mip_samples(sampler, rank, display, planes);
+  if (!follows) shots.take(0, preview, group.preview[0], coded_views(rank, few));
+  MipSamples mips = mip_samples(sampler, rank, display, planes);
+  if (follows) mips.finer = 0;
   for (std::size_t l = 0; l < mips.finer; ++l)
     shots.take(0, shots.mips(group, -static_cast<int>(l)), group.finer[l], coded_views(rank, few));
   for (std::size_t l = 0; l < mips.coarser; ++l)
@@ -380,6 +366,7 @@ void add_textures(const TextureSampler& sampler, std::size_t rank, const Studio&
   for (std::size_t g = 0; g < cells.groups.size(); ++g)
     textures.push_back(
         add_group(sampler, rank, display, sampler.groups[g], studio.few, cells.groups[g], shots));
+  if (studio.few) return;  // the exponent is a fitted one
   const std::vector<TogetherSample> samples = together_samples(studio.scenes.size(), rank);
   cells.together.resize(samples.size());  // shots hold places in it
   for (std::size_t i = 0; i < samples.size(); ++i) {
@@ -394,6 +381,22 @@ void add_textures(const TextureSampler& sampler, std::size_t rank, const Studio&
 }
 
 }  // namespace
+
+PictureLosses enlarged(const PictureLosses& from, const PictureLosses& smaller, double part) {
+  PictureLosses out = from;
+  for (const auto list : {&PictureLosses::flip, &PictureLosses::flip_p95})
+    for (std::size_t i = 0; i < from.size(); ++i) {
+      const auto now = static_cast<double>((from.*list)[i]), before = static_cast<double>((smaller.*list)[i]);
+      const double grown = before > 0 ? std::clamp(now / before, 1.0, 2.0) : 1;
+      (out.*list)[i] = static_cast<float>(std::min(1.0, now * (1 + part * (grown - 1))));
+    }
+  for (float& v : out.dssim) v = static_cast<float>(static_cast<double>(v) * kSmoother);
+  return out;
+}
+
+bool follows_below(const TextureSampler& sampler, std::size_t rank) {
+  return rank + 1 == kTextureSizes && sampler.shown.with_mips();
+}
 
 PictureLosses along_curve(const GroupCells& larger, const GroupCells& smaller, const GroupPictures& losses,
                           const PictureLosses& finer) {

@@ -122,6 +122,16 @@ struct GroupPictures {
   PictureLosses coded, preview, finer, coarser;  // as in GroupCells
 };
 
+/// Whether scales, previews and finer mips of that size follow from the two sizes below, where texels and
+/// triangles are few: all but the lowest rung and a coarser mip.
+bool follows_below(const TextureSampler& sampler, std::size_t rank);
+
+/// Of the growth to one height, what is left to the next. Geometry of saxophone, turtle, helmet and small
+/// models: .5 to .9 (of 256 to 512 beside 512 to 1024 px); previews: .3 to .7.
+inline constexpr double kGeometryGrows = 0.6, kPreviewGrows = 0.5;
+/// What is lost at twice the height: grown by `part` of the growth from `smaller`, element by element.
+PictureLosses enlarged(const PictureLosses& from, const PictureLosses& smaller, double part);
+
 /// What losses.coded, those per knot of `smaller`, would be for the knots of a larger size: along the curve
 /// that clients read, for texels as large on the screen as those of the larger size. The curve is of what
 /// coding adds to losses.finer[0], the planes without coding; `finer` are theirs at the larger size. Squares

@@ -200,6 +200,12 @@ TEST(Quality, LargeSizesOfASmallModelFollowFromTheRenderedOnes) {
   ASSERT_EQ(t.sizes_px, (std::vector<std::uint32_t>{128, 256, 512}));
   const float whole = rendered.groups[0].sizes[2].preview.flip[0];
   EXPECT_NEAR(t.groups[0].sizes[0].preview.flip[0], whole, 0.1f * whole);
+  for (std::size_t k = 1; k < t.scales.size(); ++k)
+    EXPECT_NEAR(t.geometry[0].flip[k], rendered.geometry[2].flip[k], 0.2f * rendered.geometry[2].flip[k]);
+  const float coarser = rendered.groups[0].sizes[2].coarser.flip[0];
+  EXPECT_NEAR(t.groups[0].sizes[0].coarser.flip[0], coarser, 0.1f * coarser);
+  EXPECT_GT(rendered.error, 0);
+  EXPECT_NE(t.exponent, rendered.exponent) << "fitted over many models";
   for (std::size_t i = 1; i < 3; ++i) {
     const float before = t.geometry[i - 1].flip.back(), now = t.geometry[i].flip.back();
     EXPECT_GE(now, before);
