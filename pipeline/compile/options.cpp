@@ -149,6 +149,7 @@ CompileOptions resolve_options(CompileOptions o) {
   const auto is_default = [&](const char* path, const auto& value, const auto& fallback) {
     return value == fallback && !o.set_by_user.contains(path);
   };
+  if (o.atlas.mode == AtlasMode::kAuto) o.atlas.mode = AtlasMode::kKeep;  // docs/decisions/atlas.md
   if (o.ladder.mode == LadderMode::kProgressive &&
       is_default("fragmentation.min_fragment_px", o.fragmentation.min_fragment_px,
                  FragmentationOptions{}.min_fragment_px))

@@ -197,9 +197,9 @@ Mesh in_charts(const Mesh& from, std::uint32_t charts) {
 }
 
 TEST(Atlas, TheCoarsestScaleIsSmallForAnyNumberOfCharts) {
-  for (const std::uint32_t charts : {20u, 300u, 1000u, 5000u}) {
+  for (const std::uint32_t charts : {20u, 1000u, 5000u}) {
     const Charted c =
-        charted(in_charts(testing::bumpy_sphere(60, 90), charts), {data_material(0)}, {places(256)});
+        charted(in_charts(testing::bumpy_sphere(50, 60), charts), {data_material(0)}, {places(256)});
     ScaleMap map;
     map.scales = 12;
     testing::Random random{charts};
@@ -230,12 +230,6 @@ TEST(Atlas, KeepsWhatItCannotOrNeedNotRebuild) {
   bare.uv0.clear();
   EXPECT_TRUE(is_kept(charted(bare, {data_material(0)}, {places(64)})));
   EXPECT_FALSE(is_kept(charted(mesh, {data_material(0)}, {places(64)})));
-}
-
-TEST(Atlas, AutoRebuildsManyCharts) {
-  const auto c =
-      charted(scattered(testing::bumpy_sphere(20, 30)), {data_material(0)}, {places(256)}, AtlasMode::kAuto);
-  EXPECT_NE(c.made.images.at(0).name, "a.png");
 }
 
 TEST(Atlas, SameBytesForAnyThreadCount) {
