@@ -143,10 +143,13 @@ bool is_same_object(const T& candidate, const void* part, const std::type_info& 
 CompileOptions resolve_options(CompileOptions o) {
   // Of 12 scales of a saxophone and a site with new charts 11 come 2 to 6 % nearer to S_0 than at 1.
   constexpr double kSeamWeightOfNewCharts = 0.1;
-  constexpr int kCoarsestOfNewCharts = 220;  // some 500 triangles
+  // The coarsest scales have 580 and 410 triangles then. At .05 those of the site deviate too much.
+  constexpr double kMaxShiftOfNewCharts = 0.035;
+  constexpr int kCoarsestOfNewCharts = 220;
   const auto is_default = [&](const char* path, const auto& value, const auto& fallback) {
     return value == fallback && !o.set_by_user.contains(path);
   };
+  if (o.atlas.mode == AtlasMode::kAuto) o.atlas.mode = AtlasMode::kKeep;  // docs/decisions/atlas.md
   if (o.ladder.mode == LadderMode::kProgressive &&
       is_default("fragmentation.min_fragment_px", o.fragmentation.min_fragment_px,
                  FragmentationOptions{}.min_fragment_px))
@@ -155,16 +158,18 @@ CompileOptions resolve_options(CompileOptions o) {
       is_default("ladder.uncovered", o.ladder.uncovered, LadderOptions{}.uncovered))
     o.ladder.uncovered = Uncovered::kKept;
   if (o.atlas.mode == AtlasMode::kRebuild) {
-    if (is_default("simplification.seam_weight", o.simplification.seam_weight,
-                   SimplificationOptions{}.seam_weight))
-      o.simplification.seam_weight = kSeamWeightOfNewCharts;
-    if (is_default("simplification.order", o.simplification.order, SimplificationOptions{}.order))
-      o.simplification.order = CollapseOrder::kTouching;
-    if (is_default("simplification.coarsest_vertices", o.simplification.coarsest_vertices,
-                   SimplificationOptions{}.coarsest_vertices))
-      o.simplification.coarsest_vertices = kCoarsestOfNewCharts;
-    if (is_default("proxies.mode", o.proxies.mode, ProxiesOptions{}.mode))
-      o.proxies.mode = ProxyMode::kAlways;
+    const SimplificationOptions usual_scales;
+    const auto prefer = [&](const char* path, auto& value, const auto& fallback, const auto& wanted) {
+      if (is_default(path, value, fallback)) value = wanted;
+    };
+    SimplificationOptions& scales = o.simplification;
+    prefer("simplification.order", scales.order, usual_scales.order, CollapseOrder::kTouching);
+    prefer("simplification.seam_weight", scales.seam_weight, usual_scales.seam_weight,
+           kSeamWeightOfNewCharts);
+    prefer("simplification.max_shift", scales.max_shift, usual_scales.max_shift, kMaxShiftOfNewCharts);
+    prefer("simplification.coarsest_vertices", scales.coarsest_vertices, usual_scales.coarsest_vertices,
+           kCoarsestOfNewCharts);
+    prefer("proxies.mode", o.proxies.mode, ProxiesOptions{}.mode, ProxyMode::kAlways);
   }
   if (!o.package.meta.empty()) o.package.meta = read_meta(o.package.meta, "package.meta");
   turn_by_meta(o);

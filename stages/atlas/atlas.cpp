@@ -10,9 +10,6 @@
 namespace texmesh {
 namespace {
 
-// Charts of the source from which on `auto` looks for others, and how many times fewer these must be.
-constexpr std::size_t kManyCharts = 1000;
-constexpr std::size_t kFewer = 3;
 constexpr int kLeastQuality = 75, kMostQuality = 97;  // of a JPEG
 constexpr int kPngLevel = 1;                          // the files are read once, by the stages that follow
 
@@ -143,24 +140,22 @@ void add_pages(const ConditionedMesh& mesh, const std::vector<Material>& materia
 ChartedModel chart_model(const ConditionedMesh& mesh, const std::vector<Material>& materials,
                          const std::vector<Image>& images, const AtlasOptions& options,
                          const RunContext& context) {
-  if (options.mode == AtlasMode::kKeep) return kept(mesh, materials, images, "");
+  if (options.mode != AtlasMode::kRebuild) return kept(mesh, materials, images, "");
   if (const std::string reason = reason_to_keep(mesh.mesh, materials); !reason.empty())
     return kept(mesh, materials, images, reason);
   const std::size_t charts = count_charts(mesh.mesh);
-  if (options.mode == AtlasMode::kAuto && charts < kManyCharts)
-    return kept(mesh, materials, images, "it has " + std::to_string(charts) + " charts");
   const MaterialClasses classes = find_classes(materials, images);
   const auto pages = place_charts(mesh, classes, images, options.density, context);
   if (!pages) return kept(mesh, materials, images, "its charts fit no page");
-  const std::string counts = std::to_string(pages->chart_count) + " charts for " + std::to_string(charts);
-  if (options.mode == AtlasMode::kAuto && kFewer * pages->chart_count > charts)
-    return kept(mesh, materials, images, "a new one would have " + counts);
   context.report(0.3);
   ChartedModel out;
   out.mesh = mesh_on_pages(mesh, *pages);
   add_pages(mesh, materials, images, classes, *pages, out, context);
-  add_info(out.notes, "atlas-rebuilt", "",
-           "a new atlas has " + counts + "; the source's own files of its textures are not in the package");
+  add_info(
+      out.notes, "atlas-rebuilt", "",
+      "a new atlas has " + std::to_string(pages->chart_count) + " charts for " + std::to_string(charts) +
+          "; coarse scales and coordinates take fewer bytes. The source's own files of its textures are not "
+          "in the package, and new texels differ a little from them");
   return out;
 }
 

@@ -6,7 +6,7 @@ namespace texmesh {
 
 inline constexpr int kAtlasVersion = 1;
 
-/// Whose charts the package has: the source's, new ones, or new ones where the source has very many.
+/// Whose charts the package has: the source's or new ones. Whoever makes options resolves kAuto.
 enum class AtlasMode : std::uint8_t { kKeep, kRebuild, kAuto };
 template <>
 struct EnumNames<AtlasMode> {
@@ -19,7 +19,7 @@ struct AtlasOptions {
   static void fields(auto& s, auto&& v) {
     v("mode", s.mode,
       "keep = the source's charts and textures; rebuild = few large charts, whose texels are read from the "
-      "source's; auto = rebuild where the source has many small charts");
+      "source's; auto = keep: no measure tells yet which sources would gain");
     v("density", s.density, Range{0.25, 2}, ProfileOnly{},
       "texels of a rebuilt atlas along a line on the surface, by those that the source has there");
   }
@@ -50,9 +50,9 @@ struct ChartedModel {
 /// - Normal maps are turned to the new axes, and fit the frames that renderers derive of triangles without
 ///   tangents.
 /// What is kept as it is, with a note that says why: a model without textures or texture coordinates, with
-/// textures that are not interpolated, or with directions in material extensions. `mode` kKeep gives the
-/// model back; kAuto does where the source has few charts or new ones would not be much fewer. Same bytes
-/// for any thread count and machine. Throws InputError for an image that does not decode.
+/// textures that are not interpolated, or with directions in material extensions. `mode` kKeep and
+/// kAuto give the model back. Same bytes for any thread count and machine. Throws InputError for an image
+/// that does not decode.
 ChartedModel chart_model(const ConditionedMesh& mesh, const std::vector<Material>& materials,
                          const std::vector<Image>& images, const AtlasOptions& options,
                          const RunContext& context);

@@ -562,13 +562,14 @@ std::vector<TextureInfo> describe_planes(const Fragments& fragments) {
   return out;
 }
 
+/// `pixels` may be larger than the plane: whole fragments.
 Bytes whole_plane(const TexturePlane& plane, const Pixels& pixels, int quality) {
   JpegKind kind;
   kind.channels = pixels.channels;
   kind.rgb = !is_colour(plane.role) && pixels.channels == 3;
   kind.file = FileSteps{static_cast<double>(quality), false, false};
-  return JpegCoder(kind).complete({pixels.data.data(), std::size_t{pixels.width_px} * pixels.channels,
-                                   pixels.width_px, pixels.height_px});
+  return JpegCoder(kind).complete(
+      {pixels.data.data(), std::size_t{pixels.width_px} * pixels.channels, plane.width_px, plane.height_px});
 }
 
 }  // namespace

@@ -353,7 +353,8 @@ bool CollapseRing::keeps_topology(std::uint32_t slot) {
     if (left > most || (left < 1 && !(may_touch_ && mesh_.corner_count(n.point) > n.faces))) return false;
   }
   if (!keeps_positions(slot)) return false;
-  if (!closes || may_touch_) return true;
+  if (may_touch_) return corners_.size() + mesh_.corner_count(v) > 2 * neighbours_[slot].valence;
+  if (!closes) return true;
   for (const Corner& c : corners_) {  // a face of u that would repeat a face of v
     if (c.a == slot || c.b == slot || neighbours_[c.a].faces == 0 || neighbours_[c.b].faces == 0) continue;
     const std::uint32_t a = neighbours_[c.a].point, b = neighbours_[c.b].point;

@@ -96,6 +96,8 @@ TEST(Options, NewChartsHaveDefaultsOfTheirOwn) {
   CompileOptions o;
   EXPECT_EQ(resolve_options(o).simplification.seam_weight, 1);
   EXPECT_EQ(resolve_options(o).proxies.mode, ProxyMode::kAuto);
+  o.atlas.mode = AtlasMode::kAuto;
+  EXPECT_EQ(resolve_options(o).atlas.mode, AtlasMode::kKeep);
   o.atlas.mode = AtlasMode::kRebuild;
   EXPECT_EQ(resolve_options(o).simplification.seam_weight, 0.1);
   EXPECT_EQ(resolve_options(o).simplification.order, CollapseOrder::kTouching);

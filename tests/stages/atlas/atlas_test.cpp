@@ -196,9 +196,9 @@ Mesh in_charts(const Mesh& from, std::uint32_t charts) {
 }
 
 TEST(Atlas, TheCoarsestScaleIsSmallForAnyNumberOfCharts) {
-  for (const std::uint32_t charts : {20u, 300u, 1000u, 5000u}) {
+  for (const std::uint32_t charts : {20u, 1000u, 5000u}) {
     const Charted c =
-        charted(in_charts(testing::bumpy_sphere(60, 90), charts), {data_material(0)}, {places(256)});
+        charted(in_charts(testing::bumpy_sphere(50, 60), charts), {data_material(0)}, {places(256)});
     ScaleMap map;
     map.scales = 12;
     testing::Random random{charts};
@@ -231,12 +231,6 @@ TEST(Atlas, KeepsWhatItCannotOrNeedNotRebuild) {
   EXPECT_FALSE(is_kept(charted(mesh, {data_material(0)}, {places(64)})));
 }
 
-TEST(Atlas, AutoRebuildsManyCharts) {
-  const auto c =
-      charted(scattered(testing::bumpy_sphere(20, 30)), {data_material(0)}, {places(256)}, AtlasMode::kAuto);
-  EXPECT_NE(c.made.images.at(0).name, "a.png");
-}
-
 TEST(Atlas, SameBytesForAnyThreadCount) {
   const Mesh mesh = scattered(testing::bumpy_sphere(12, 18));
   const auto one = charted(mesh, {data_material(0)}, {places(256)}),
@@ -244,6 +238,35 @@ TEST(Atlas, SameBytesForAnyThreadCount) {
   EXPECT_EQ(one.made.mesh.mesh, many.made.mesh.mesh);
   EXPECT_EQ(one.made.materials, many.made.materials);
   EXPECT_EQ(one.made.images, many.made.images);
+}
+
+TEST(Atlas, AlphaStaysBesideMaterialsWithoutTextures) {
+  Mesh mesh = scattered(testing::bumpy_sphere(8, 10));
+  for (std::size_t t = 0; t < mesh.triangles.size(); ++t)
+    mesh.triangle_material[t] = std::uint16_t(t % 3 == 0);  // scraps without a texture among the others
+  Pixels clear{64, 64, 4, {}};
+  for (std::size_t i = 0; i < 64 * 64; ++i) clear.data.insert(clear.data.end(), {200, 100, 50, 77});
+  Material glass;
+  glass.base_colour_texture.image = 0;
+  glass.alpha_mode = AlphaMode::kBlend;
+  const Image image{"a.png", ImageFormat::kPng, 64, 64, 4, 8, false, false, write_png(clear)};
+  const Charted c = charted(mesh, {glass, Material{}}, {image});
+  expect_same_surface(c);
+  ASSERT_EQ(c.made.images.size(), 1u);
+  EXPECT_NE(c.made.images[0].name, "a.png");
+  const Pixels texels = decode_image(c.made.images[0]);
+  ASSERT_EQ(texels.channels, 4u);
+  for (std::uint32_t t = 0; t < mesh.triangles.size(); ++t) {
+    const Material& made = c.made.materials[c.made.mesh.mesh.triangle_material[t]];
+    const bool textured = c.source.mesh.triangle_material[t] == 0;
+    EXPECT_EQ(made.base_colour_texture.used(), textured);
+    if (!textured) continue;
+    EXPECT_EQ(made.alpha_mode, AlphaMode::kBlend);
+    const Vec2f at = middle(c.made.mesh.mesh, c.made.mesh.mesh.triangles[t]);
+    EXPECT_EQ(texels.at(std::uint32_t(at.x * float(texels.width_px)),
+                        std::uint32_t(at.y * float(texels.height_px)))[3],
+              77);
+  }
 }
 
 TEST(Atlas, StrangeModelsAreRebuiltOrKept) {
@@ -270,6 +293,7 @@ TEST(Atlas, StrangeModelsAreRebuiltOrKept) {
                                  one,
                                  with_uv(testing::sliver_sheet(6), 1),
                                  with_uv(testing::dust(60, 0.01f), 1),
+                                 with_uv(testing::dust(1500, 0.01f), 1),  // crumbs
                                  with_uv(testing::random_soup(random, 30, 80), 1)};
   for (std::size_t i = 0; i < meshes.size(); ++i)
     for (const std::uint32_t side_px : {1u, 33u}) {

@@ -13,7 +13,7 @@ class GltfScalesOf : public ::testing::Test {
   GltfScalesOf() : c_(testing::bumpy_sphere(40, 60)) {
     c_.materials[0].base_colour_texture.image = 0;
     c_.add_image(TextureRole::kBaseColour);
-    filled_.push_back(picture(512, 512, 3));
+    filled_.push_back(picture(528, 544, 3));  // whole fragments: more than the plane's 512 x 512
     PlaneTables t;
     t.columns = t.rows = 1;
     t.rung_quality = {30, 90};

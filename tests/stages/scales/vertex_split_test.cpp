@@ -217,6 +217,10 @@ TEST(VertexSplit, NonManifoldSpineAndDoubledSheets) {
 TEST(VertexSplit, SurfacesThatTouch) {
   for (const Mesh& mesh : {testing::sieve(15), open_book(), many_charts()})
     expect_stream(simplified(mesh, 10, CollapseOrder::kTouching), true);
+  for (std::uint64_t round = 1; round <= 10; ++round) {
+    testing::Random random{round};
+    expect_stream(simplified(testing::random_soup(random, 60, 300, 5), 10, CollapseOrder::kTouching), true);
+  }
 }
 
 /// As if whole components had vanished: their faces leave the coarser scales without a collapse.
