@@ -544,11 +544,10 @@ void leave_out_finest(const ScaleFiles& files, std::vector<GlbBeside>& made, Not
   const auto finest = static_cast<double>(files.files.front().glb.size());
   double room = (kMostOverFinest - 1) * finest - static_cast<double>(files.files.back().glb.size());
   for (const GlbBeside& glb : made) room -= static_cast<double>(glb.file.size());
-  while (room < 0 && !made.empty()) {
+  for (; room < 0 && !made.empty(); made.erase(made.begin())) {
     room += static_cast<double>(made.front().file.size());
     add_info(notes, "no-glb", "scale " + std::to_string(made.front().scale->scale),
              "has no GLB: it would have too many bytes beside S_0's (scales.glb all writes it)");
-    made.erase(made.begin());
   }
 }
 
