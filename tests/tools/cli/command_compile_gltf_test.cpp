@@ -76,6 +76,21 @@ TEST_F(CompileGltf, TheTreeHasThemAndPacksToTheSameBytes) {
   EXPECT_EQ(run_command({TEXMESH_BINARY, "verify", tree}).exit_code, 1);
 }
 
+TEST_F(CompileGltf, PicturesThatAreNoWholeBlocksAreSound) {
+  Random random{6};
+  const Bytes glb = chunks_glb(textured_sphere(4, .1), 1, ChunkKind::kExact, random, png_bytes(200, 200, 3));
+  write_text(folder_ / "sphere.glb", {glb.begin(), glb.end()});
+  for (const char* atlas : {"keep", "rebuild"}) {
+    const std::string package = folder_ / (std::string(atlas) + ".texmesh");
+    const CommandResult made =
+        run_command({TEXMESH_BINARY, "compile", folder_ / "sphere.glb", "-o", package, "--no-cache",
+                     "--profile", folder_ / "profile.json", "--scales.glb", "all", "--atlas", atlas});
+    EXPECT_EQ(made.exit_code, 0) << made.output << made.errors;
+    const CommandResult verified = run_command({TEXMESH_BINARY, "verify", package});
+    EXPECT_EQ(verified.exit_code, 0) << atlas << verified.output << verified.errors;
+  }
+}
+
 TEST_F(CompileGltf, WithoutThemAPackageIsOfTheEarlierVersion) {
   EXPECT_EQ(json_of({"dump", compile("ends")})["package"]["version"]["minor"], 0);
   EXPECT_EQ(json_of({"dump", compile("all")})["package"]["version"]["minor"], 1);
