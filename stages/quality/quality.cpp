@@ -197,9 +197,10 @@ PictureLosses finer_along(const PictureLosses& finer, const GroupCells& smaller,
   return out;
 }
 
-// Of models of few texels and triangles, over eleven made ones and ten scans cut to 1,000 to 4,500 triangles:
-// how losses add up (mean of fitted exponents; 1.7 to 3.0), the error of what is predicted for plans, and
-// what is left at twice the height of what finer texels lose by charts' borders (.3 to .7).
+// Of models of few texels and triangles, fitted over six made ones and four scans cut to 1,500 to 2,300
+// triangles (docs/decisions/quality-table.md): how losses add up (2.0 to 2.5), the error of what is predicted
+// for plans of ten others, and what is left at twice the height of what finer texels lose by charts' borders
+// (.3 to .7).
 constexpr float kFewExponent = 2.15f, kFewError = 0.1f, kSeamsLeft = 0.5f;
 
 /// What the knots of all groups and the scales lose at one size, rendered or not.
