@@ -114,6 +114,31 @@ class ModelSource {
     }};
   }
 
+  /// The notes that an archive has beside its model, as texmesh writes them; "" without any. Where they
+  /// cannot be read, `notes` says so. InputError when the archive is not what it was at open().
+  std::string archived_notes(Notes& notes) {
+    if (lower_ending(path_.native()) != ".zip") return "";
+    const std::string name = path_.filename().string();
+    // Only a stamp that has settled tells that the file is still the same.
+    const bool settled = main_.stamp.is_settled(wall_clock_ns());
+    if (!settled) read_model();
+    std::string place = name, found, wrong;
+    try {
+      ArchiveFiles archive(settled ? open_file_source(path_.string()) : memory_source(bytes_, name),
+                           kAnyArchiveSize);
+      if (const auto file = archived_annotations(archive)) {
+        place += "/" + file->first;
+        found = write_annotations(read_source_annotations(file->second, place, notes));
+      }
+    } catch (const Error& e) {
+      wrong = std::string("the notes are left out: ") + e.what();
+    }
+    forget_bytes();
+    if (settled && stamp_of(path_.string()) != main_.stamp) refuse_changed();
+    if (!wrong.empty()) add_warning(notes, "annotations", place, wrong);
+    return found;
+  }
+
   /// For provenance: the model's own references, never the paths of this machine.
   std::vector<ProvenanceInput> inputs() const {
     std::vector<ProvenanceInput> all{{"model", "", main_.digest, main_.bytes}};
@@ -140,6 +165,10 @@ class ModelSource {
       }
     read_model();
   }
+  [[noreturn]] void refuse_changed() const {
+    throw InputError(path_.filename().string(), "", "a file that stays as it is while it is compiled",
+                     "one that has changed meanwhile");
+  }
   /// A file of a gigabyte need not wait for the package. Whoever needs it again reads it again.
   void forget_bytes() {
     bytes_ = {};
@@ -150,9 +179,7 @@ class ModelSource {
     bytes_ = read_input_file(path_, static_cast<std::uint64_t>(options_.max_file_bytes), &stamp);
     has_bytes_ = true;
     const FileRequest found{"", true, sha256(bytes_), bytes_.size(), stamp, false};
-    if (main_.found && (found.digest != main_.digest || found.bytes != main_.bytes))
-      throw InputError(path_.filename().string(), "", "a file that stays as it is while it is compiled",
-                       "one that has changed meanwhile");
+    if (main_.found && (found.digest != main_.digest || found.bytes != main_.bytes)) refuse_changed();
     main_ = found;
   }
   Sha256 list_key() const {
@@ -242,16 +269,8 @@ std::string provenance(const ModelSource& source, const CompileOptions& options)
 }
 
 /// The options with the notes that an archive has beside its model, where the user gives no others.
-CompileOptions with_archived_annotations(CompileOptions options, const std::string& input, Notes& notes) {
-  if (!options.package.annotations.empty()) return options;
-  const auto found = archived_annotations(input);
-  if (!found) return options;
-  const std::string name = fs::path(input).filename().string() + "/" + found->first;
-  try {
-    options.package.annotations = write_annotations(read_source_annotations(found->second, name, notes));
-  } catch (const Error& e) {
-    add_warning(notes, "annotations", name, std::string("the notes are left out: ") + e.what());
-  }
+CompileOptions with_archived_notes(CompileOptions options, ModelSource& source, Notes& notes) {
+  if (options.package.annotations.empty()) options.package.annotations = source.archived_notes(notes);
   return options;
 }
 
@@ -285,7 +304,7 @@ CompileOutcome compile_source(const CompileRequest& request, const CompileOption
                               const StageObserver& observer) {
   source.open(store, context, true);
   Notes notes;
-  const CompileOptions options = with_archived_annotations(resolved, request.input, notes);
+  const CompileOptions options = with_archived_notes(resolved, source, notes);
   ModelGraph graph(source, stage_table(options), options, store, context, observer);
   graph->explain(request.earlier_keys, request.explainer);
   const std::shared_ptr<const Bytes> package = graph->run(kPackage);
@@ -340,7 +359,7 @@ std::vector<StageForecast> forecast_model(const CompileRequest& request, Store& 
   ModelSource source(request);
   source.open(store, context, false);
   Notes unused;
-  options = with_archived_annotations(std::move(options), request.input, unused);
+  options = with_archived_notes(std::move(options), source, unused);
   ModelGraph graph(source, stage_table(options), options, store, context, {});
   graph->explain(request.earlier_keys, {});
   std::vector<StageForecast> forecasts;

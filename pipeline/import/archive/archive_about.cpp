@@ -78,18 +78,12 @@ About archive_about(ArchiveFiles& archive, const std::string& model, Notes& note
   return about;
 }
 
-std::optional<std::pair<std::string, Bytes>> archived_annotations(const std::string& path) {
-  if (lower_extension(path) != "zip") return {};
-  try {
-    ArchiveFiles archive(open_file_source(path), kAnyArchiveSize);
-    const auto named = [&](const auto& wanted) { return least_deep(archive, kMaxNotesFileBytes, wanted); };
-    const ArchivedFile* found = named([](const std::string& name) { return name == "annotations.json"; });
-    if (!found) found = named([](const std::string& name) { return name.ends_with("svx.json"); });
-    if (!found) return {};
-    return std::pair(readable_name(found->name), archive.unpacked(*found, kMaxNotesFileBytes));
-  } catch (const Error&) {
-    return {};  // the import says what is wrong with the archive
-  }
+std::optional<std::pair<std::string, Bytes>> archived_annotations(ArchiveFiles& archive) {
+  const auto named = [&](const auto& wanted) { return least_deep(archive, kMaxNotesFileBytes, wanted); };
+  const ArchivedFile* found = named([](const std::string& name) { return name == "annotations.json"; });
+  if (!found) found = named([](const std::string& name) { return name.ends_with("svx.json"); });
+  if (!found) return {};
+  return std::pair(readable_name(found->name), archive.unpacked(*found, kMaxNotesFileBytes));
 }
 
 }  // namespace texmesh

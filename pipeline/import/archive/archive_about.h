@@ -10,9 +10,8 @@ namespace texmesh {
 /// coords.txt or proj.txt names. `model`: the model's name in the archive.
 About archive_about(ArchiveFiles& archive, const std::string& model, Notes& notes);
 
-/// The file of notes in the archive of this path, by name and bytes: annotations.json, else Voyager's
-/// NAME.svx.json, the least deep. Nothing for what is no archive or has none. Only the directory and this
-/// file are read.
-std::optional<std::pair<std::string, Bytes>> archived_annotations(const std::string& path);
+/// The archive's file of notes, by name and bytes: annotations.json, else Voyager's NAME.svx.json, the least
+/// deep. Nothing where it has none. InputError where it cannot be unpacked.
+std::optional<std::pair<std::string, Bytes>> archived_annotations(ArchiveFiles& archive);
 
 }  // namespace texmesh
