@@ -115,18 +115,21 @@ TEST(GoldenPackages, ShowTheirFeatures) {
   EXPECT_GT(open("requantised").textures().front().rungs.size(), 1u);
 }
 
-// Packages of 2.1 come when it is frozen; from then on they stay.
 TEST(GoldenPackages, OfTwoOneShowNotes) {
-  const fs::path package = kGolden / "v2.1-notes.texmesh";
-  const bool frozen = testing::read_text((kGolden / "FROZEN").string()).find(" v2.1-") != std::string::npos;
-  ASSERT_TRUE(fs::exists(package) || !frozen);
-  if (!fs::exists(package)) GTEST_SKIP() << "2.1 is not frozen yet: tests/golden/make";
-  PackageReader reader(open_store(package.string()));
+  PackageReader reader(open_store((kGolden / "v2.1-notes.texmesh").string()));
   ASSERT_EQ(reader.annotations().list.size(), 2u);
   const Annotation& first = reader.annotations().list[0];
   EXPECT_EQ(first.texts.size(), 2u);
   EXPECT_TRUE(first.normal && first.camera && first.images.size() == 1);
   EXPECT_EQ(reader.manifest().minor, 1);
+}
+
+TEST(GoldenPackages, OfTwoOneShowStepsAsGlbs) {
+  PackageReader reader(open_store((kGolden / "v2.1-steps.texmesh").string()));
+  EXPECT_EQ(reader.manifest().minor, 1);
+  const std::vector<std::uint8_t> glb = reader.entry("gltf/s02.glb");
+  EXPECT_NE(std::string(glb.begin(), glb.end()).find(R"("uri":"000-r02.jpg")"), std::string::npos);
+  EXPECT_FALSE(reader.entry("gltf/000-r02.jpg").empty());
 }
 
 TEST(GoldenPackages, TheTreeIsThatOfItsContainer) {
