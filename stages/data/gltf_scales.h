@@ -1,5 +1,6 @@
 #pragma once
 #include "format/base/bytes.h"
+#include "format/base/note.h"
 
 namespace texmesh {
 
