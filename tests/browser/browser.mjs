@@ -1,6 +1,7 @@
 // Debian's chromium, headless, drawing with SwiftShader; and the folders that `run` has made ready.
 import {execFileSync, spawn} from 'node:child_process';
 import fs from 'node:fs';
+import {createRequire} from 'node:module';
 import path from 'node:path';
 import {chromium} from 'playwright-core';
 import {PNG} from 'pngjs';
@@ -17,6 +18,11 @@ export const env = {
 export const packages = path.join(env.work, 'packages');
 export const pictures = path.join(env.work, 'pictures');
 fs.mkdirSync(pictures, {recursive: true});
+
+/** Looks at a page's names, roles, labels and contrasts. */
+export const axe = fs.readFileSync(createRequire(import.meta.url).resolve('axe-core/axe.min.js'), 'utf8');
+export const kDesktop = {width: 1280, height: 800};
+export const kPhone = {width: 390, height: 844};
 
 /** Folders of the laboratory page; packages stand under /packages/ wherever they are served. */
 export const labRoots = {

@@ -1,8 +1,8 @@
 // Notes at points of an object, measuring, and AR: in the element and in the viewer, by mouse and by keys.
-import {check, env, fs, near, path, pictures, run} from './browser.mjs';
+import {axe, check, env, fs, near, path, pictures, run} from './browser.mjs';
 import {test} from './harness.mjs';
 import {html, onPage, settled} from './page-tests.mjs';
-import {axe, phase, shot, withViewer} from './viewer-tests.mjs';
+import {phase, shot, withViewer} from './viewer-tests.mjs';
 
 const noted = (attributes = '', style = '') => html(`<texmesh-viewer src="/packages/noted.texmesh" alt="a statue" camera-controls ${attributes}></texmesh-viewer>`,
   `.grid{grid-template-columns:1fr}texmesh-viewer{height:600px}${style}`).replace('<title>', '<meta name="viewport" content="width=device-width"><title>');

@@ -1,13 +1,7 @@
 // The viewer as people use it: its build in a folder of its own, the package somewhere beneath, a screenshot of every state.
-import {createRequire} from 'node:module';
-import {check, common, env, fs, listen, path, pictures, serve, startView, viewerRoots, packages} from './browser.mjs';
+import {axe, check, common, env, fs, kDesktop, kPhone, listen, path, pictures, serve, startView, viewerRoots, packages} from './browser.mjs';
 import {test} from './harness.mjs';
 import {startLink} from './link.mjs';
-
-/** Looks at a page's names, roles, labels and contrasts. */
-export const axe = fs.readFileSync(createRequire(import.meta.url).resolve('axe-core/axe.min.js'), 'utf8');
-export const kDesktop = {width: 1280, height: 800};
-export const kPhone = {width: 390, height: 844};
 
 /** Opens the viewer on a package; `body` gets the page. Nothing may be said on the console, nothing asked of elsewhere. */
 export async function withViewer(query, body, {viewport = kDesktop, dark = false, touch = false, quiet = true, fault, through} = {}) {

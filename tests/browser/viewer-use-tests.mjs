@@ -1,8 +1,8 @@
 // The viewer by hand: what its controls, plots and comparison do, in what order its frames come, what is left when the server goes.
-import {PNG, check, env, fs, packages, path, run} from './browser.mjs';
+import {PNG, check, env, fs, kPhone, packages, path, run} from './browser.mjs';
 import {test} from './harness.mjs';
 import {starvation} from './starved.mjs';
-import {kPhone, live, phase, settled, shot, withViewer} from './viewer-tests.mjs';
+import {live, phase, settled, shot, withViewer} from './viewer-tests.mjs';
 
 const kFast = {bytesPerSecond: 1e12, rttMs: 0};
 const timedPartOver = (page) => page.waitForFunction(() => Number.isFinite(window.texmeshViewer?.session.live.doneS), null, {timeout: 60000});
