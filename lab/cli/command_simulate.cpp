@@ -78,13 +78,6 @@ void print_table(const SimulateArguments& a, const Table& table, Json about, con
 
 // ---- chapter 4
 
-/// The thesis's limits of quality hold in its table.
-HtcOptions chapter_options(const SimulateArguments& a) {
-  HtcOptions o = options_of({.order = a.order.value_or(HtcOrder::kCredit)});
-  o.hard_limits = true;
-  return o;
-}
-
 /// What of the theorem holds over all runs.
 struct TheoremSummary {
   double identity_error = 0, largest_surplus_s = 0;  // the error as a share of T_0
@@ -101,7 +94,7 @@ struct TheoremSummary {
 void print_theorem(const SimulateArguments& a) {
   constexpr int kShown = 10;
   const std::vector<FragmentOffer> offers = table_4_2_offers();
-  const HtcOptions options = chapter_options(a);
+  const HtcOptions options = chapter_options(a.order.value_or(HtcOrder::kCredit));
   const int runs = 50 * a.seeds;
   Table table{"",
               {{"run", 0, "run"},
@@ -255,9 +248,8 @@ void simulate_lost_packets(const SimulateArguments& a, DeliveryRequest request) 
       fmt::format(
           "lost packets are not sent again, as over UDP; HTTP loses none. Of {} points and {} fragments:\n",
           grouped(whole.points().size()), grouped(fragments)),
-      "lost points stand where their texture coordinates lie among their neighbours' (chapter 10), or at the mean "
-      "of these;\nlost fragments show their preview. FLIP is predicted of the textures; it does not see "
-      "the points\n");
+      "lost points stand where their texture coordinates lie among their neighbours' (chapter 10), or at the mean of "
+      "these;\nlost fragments show their preview. FLIP is predicted of the textures; it does not see the points\n");
 }
 
 // ---- several objects
@@ -293,6 +285,7 @@ void simulate_page(const SimulateArguments& a, const DeliveryRequest& request) {
                {"px", 0, "display_px"},
                {"shows"},
                Column::data("scale"),
+               Column::data("proxy"),
                Column::data("first_picture_only"),
                {"bytes", kGrouped, "bytes"},
                {"FLIP", 4, "flip"},
@@ -304,15 +297,12 @@ void simulate_page(const SimulateArguments& a, const DeliveryRequest& request) {
                picture_only ? "first picture"
                : p.proxy    ? fmt::format("proxy {}", *p.proxy)
                             : fmt::format("S_{}", p.scale),
-               p.scale, picture_only, p.bytes(), p.flip, plan.alone_flip[i]});
+               p.scale, p.proxy, picture_only, p.bytes(), p.flip, plan.alone_flip[i]});
   }
   const double limit_s = request.time_limit_s, off = 100 * (limit_s - plan.complete_s) / limit_s;
   if (a.json) {
-    Json list = table.json();
-    for (std::size_t i = 0; i < objects.size(); ++i)
-      if (plan.objects[i].proxy) list[i]["proxy"] = *plan.objects[i].proxy;
     std::cout << Json{{"version", 1},
-                      {"objects", list},
+                      {"objects", table.json()},
                       {"first_pictures_s", plan.first_pictures_s},
                       {"meshes_s", plan.meshes_s},
                       {"complete_s", plan.complete_s},
@@ -461,16 +451,15 @@ void add_method_options(Command& c, SimulateArguments& a) {
   c.group("Method");
   c.choice(
        "--policy", a.method.policy,
-       "htca = the thesis's method; guard = htca around the plan of least loss, with sizes within a factor of 1.5 "
-       "of that plan's share; price = one price of bytes, which rises when the transfer is late; proportional = "
-       "planned sizes scaled by the time left; static = planned sizes, always; thesis = chapters 4 and 7 as "
-       "printed: htca with --rule distance, --order beta0, --window 1, --hard-limits and the list that T_0 beta_0 "
-       "pays")
+       "htca = the thesis's method; guard = htca around the plan of least loss, with sizes within a factor of 1.5 of "
+       "that plan's share; price = one price of bytes, which rises when the transfer is late; proportional = planned "
+       "sizes scaled by the time left; static = planned sizes, always; thesis = chapters 4 and 7 as printed: htca "
+       "with --rule distance, --order beta0, --window 1, --hard-limits and the list that T_0 beta_0 pays")
       .shows_default("guard");
-  c.choice("--order", a.order,
-           "Next fragment: credit = by the sign of the credit; beta0 = by the throughput, as first "
-           "published; finest = always the finest. Default: finest with --policy guard, beta0 with "
-           "thesis, else credit");
+  c.choice(
+      "--order", a.order,
+      "Next fragment: credit = by the sign of the credit; beta0 = by the throughput, as first published; finest "
+      "= always the finest. Default: finest with --policy guard, beta0 with thesis, else credit");
   c.choice(
       "--estimator", a.estimator,
       "Throughput: last = of the last transfer; harmonic = harmonic mean of several; ewma = mean that forgets "
@@ -528,9 +517,9 @@ void add_play_options(Command& c, SimulateArguments& a) {
       "--beside", a.beside,
       "Another package that shares link and time limit, and its displayed height in px; may be given again",
       "PKG[,PX]");
-  c.flag("--no-repeat", a.no_repeat,
-         "Packets of --loss are not sent again: a table of what that costs mesh and textures (HTTP sends "
-         "them again)")
+  c.flag(
+       "--no-repeat", a.no_repeat,
+       "Packets of --loss are not sent again: a table of what that costs mesh and textures (HTTP sends them again)")
       .excludes(beside);
   c.option("--picture", a.picture,
            "With --no-repeat: a PNG of the mesh as it should be, with lost points at the mean of their "

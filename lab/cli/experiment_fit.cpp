@@ -48,10 +48,6 @@ std::optional<DesignKey> design_of(const std::string& path) {
   return read_design(read_input_file(file, kMaxDesignFile), file);
 }
 
-void write_text(const std::string& path, const std::string& text) {
-  write_output_file(path, text_bytes(text));
-}
-
 int run_fit(const FitArguments& args) {
   for (const std::string& path : {args.profile, args.page})
     if (!path.empty()) check_output_file(path);  // not after the work
@@ -60,8 +56,8 @@ int run_fit(const FitArguments& args) {
   options.draws = args.draws, options.seed = args.seed;
   const ExperimentFit fit =
       fit_experiment(read_files(args), design_of(args.design), options, context_of(args.jobs));
-  if (!args.page.empty()) write_text(args.page, fit_page(fit));
-  if (fit.found && !args.profile.empty()) write_text(args.profile, jnd_profile_json(fit));
+  if (!args.page.empty()) write_output_file(args.page, text_bytes(fit_page(fit)));
+  if (fit.found && !args.profile.empty()) write_output_file(args.profile, text_bytes(jnd_profile_json(fit)));
   std::cout << (args.json ? fit_json(fit) + "\n" : fit_text(fit));
   return fit.found ? kExitOk : kExitDifferent;
 }

@@ -22,8 +22,8 @@ constexpr std::size_t kLeastLevels = 3, kMaxTitle = 200, kMaxUrl = 500;
 constexpr double kLeastSizePx = 16, kMostSizePx = 2048, kMostShapeLevel = 0.4;
 
 constexpr const char* kConsent =
-    "You take part in an experiment about seeing. It shows pictures of objects and asks which of two is the same "
-    "as a third one. It does no harm; who gets tired may stop at any time by closing the page.\n\n"
+    "You take part in an experiment about seeing. It shows pictures of objects and asks which of them look "
+    "alike. It does no harm; who gets tired may stop at any time by closing the page.\n\n"
     "Kept are: your choices and how long each took, the size and the pixels of your screen, the day, and the name "
     "that you enter. All of it stays in this browser until you save it as a file or send it yourself at the end.";
 
@@ -119,9 +119,14 @@ ExperimentOptions experiment_options(const MakeArguments& args) {
   if (options.sizes_px.size() > kMostSizes)
     throw UsageError("--sizes", "", fmt::format("at most {} sizes", kMostSizes),
                      std::to_string(options.sizes_px.size()));
+  if (options.move && options.sizes_px.size() > 1)
+    throw UsageError("--sizes", "", "one size with --move: the nearest",
+                     std::to_string(options.sizes_px.size()));
   if (args.title.size() > kMaxTitle || !is_plain_text(args.title))
     throw UsageError("--title", "", fmt::format("at most {} bytes of UTF-8", kMaxTitle), "another text");
-  options.title = args.title.empty() ? "Which one is the same?" : args.title;
+  options.title = !args.title.empty() ? args.title
+                  : options.move      ? "Where do both look alike?"
+                                      : "Which one is the same?";
   options.consent = args.consent.empty() ? kConsent : text_of(args.consent);
   check_post_url(args.post);
   options.post_url = args.post;
@@ -165,11 +170,6 @@ int run_make(const MakeArguments& args) {
   std::optional<PackageReader> package;
   if (options.kind == StimulusKind::kMesh) package.emplace(open_store(args.package));
   const StimulusSet stimuli = package ? package_stimuli(*package, context) : shape_stimuli(options);
-  try {
-    check_pictures(options, stimuli);
-  } catch (const InputError& e) {
-    throw UsageError(e.file(), e.place(), e.expected(), e.found());
-  }
   const Experiment experiment = make_experiment(options, stimuli, context);
   write_experiment(experiment, args.folder);
   print_experiment(args, experiment);
@@ -198,6 +198,10 @@ void add_stimulus_options(Command& c, MakeArguments& args) {
        "Relative changes, with commas between. Default: 0.01 to 0.15 for ellipsoids, 0.02 to 0.27 for quadrics",
        "X,..")
       .separated_by(',');
+  c.flag(
+      "--move", args.options.move,
+      "Judges move the changed object, of 21 places to 1/16 of the size, until it looks like the unchanged one "
+      "(6.2), without a time limit; where it looks alike, fit finds for each change");
   c.option("--objects", args.options.objects, "How many ellipsoids or quadrics")
       .integer_in(1, kMostObjects)
       .shows_default();
@@ -250,12 +254,15 @@ void add_make_experiment(Command& experiment) {
       "  texmesh-lab experiment make --stimuli quadrics -o judges/\n"
       "  texmesh-lab experiment make --stimuli quadrics --sizes 64,128,256 -o distance/\n"
       "  texmesh-lab experiment make bust.texmesh --sizes 96,192 -o bust-judges/ --post https://example.org/results\n"
+      "  texmesh-lab experiment make bust.texmesh --move --sizes 320 -o bust-moves/\n"
       "  cd judges && python3 -m http.server      and open http://localhost:8000/");
   c.notes(
       "A judge sees a reference on top and two alternatives beneath it, one unchanged and one changed, and chooses the "
       "one that is the same. The page measures the screen with a bank card, says how far to sit, shows pictures without "
       "resampling, asks in a balanced drawn order, and keeps the answers in the browser. At the end the judge saves them "
       "as a file for texmesh-lab experiment fit. The page asks no other server for anything.\n"
+      "With --move an object stays and the judge moves the changed one beside it. Catch trials are an unchanged object, "
+      "which nobody has to move away.\n"
       "30 answers a level or more make a threshold (5.6): with 6 repeats that is five judges.\n"
       "Names and sizes of the pictures tell nothing; design.json tells all, so judges must not read it.\n"
       "The same options give the same files on every machine.\n"

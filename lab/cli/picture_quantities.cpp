@@ -93,8 +93,7 @@ PaintedModel paint_collapse_error(const NestedScales& scales) {
     v = v == kNever ? hi : std::max(v, legend.lo);
   }
   legend.remarks.push_back(fmt::format(
-      "{} collapses; {} of the vertices are left in the coarsest scale and "
-      "have the highest colour",
+      "{} collapses; {} of the vertices are left in the coarsest scale and have the highest colour",
       scales.collapses.size(), share_text(static_cast<double>(kept), static_cast<double>(value.size()))));
   for (const NestedScale& s : scales.scales)
     if (!s.floor_reason.empty()) {

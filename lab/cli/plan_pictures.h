@@ -42,8 +42,7 @@ class PlanPictures {
   /// stand for the source. `views` >= 1 from directions spread over the sphere. InputError where the source
   /// has other images.
   PlanPictures(PackageReader& package, const std::string& source, int views, const RunContext& context);
-  /// At exactly that displayed height of the object, px.
-  /// InputError for a proxy that is not there.
+  /// At exactly that displayed height of the object, px. InputError for a proxy that is not there.
   RenderedFlip measure(const ShownPackage& shown, double displayed_px);
 
  private:

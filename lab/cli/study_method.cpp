@@ -36,7 +36,7 @@ struct MethodArguments {
 
 /// One system: a package, and how a client reads it.
 struct System {
-  std::string name, package;
+  std::string package;
   bool printed = false;
 };
 
@@ -113,7 +113,7 @@ SystemFigures figures_of(const MethodArguments& args, const System& system) {
   const std::string against = is_package(args.input) ? args.against : args.input;
   PlanPictures pictures(package, against, args.views, context_of(args.jobs));
   SystemFigures out;
-  out.name = system.name;
+  out.name = system.printed ? "thesis" : "texmesh";
   for (const EntryRef& e : package.entries()) out.package_bytes += e.bytes;
   for (const ManifestScale& s : package.manifest().scales) out.scales.push_back(s.scale);
   out.steps =
@@ -125,9 +125,8 @@ SystemFigures figures_of(const MethodArguments& args, const System& system) {
 
 std::vector<System> systems_of(const MethodArguments& args, const fs::path& scratch) {
   if (!is_package(args.input))
-    return {{"texmesh", compiled(args, scratch, ""), false},
-            {"thesis", compiled(args, scratch, "thesis"), true}};
-  return {{"texmesh", args.input, false}, {"thesis", args.thesis.empty() ? args.input : args.thesis, true}};
+    return {{compiled(args, scratch, ""), false}, {compiled(args, scratch, "thesis"), true}};
+  return {{args.input, false}, {args.thesis.empty() ? args.input : args.thesis, true}};
 }
 
 Table method_table(const std::vector<const SystemFigures*>& systems) {

@@ -1,7 +1,6 @@
 // texmesh-lab study prediction: what plans are predicted to look like, beside what they look like.
 #include <fmt/format.h>
 
-#include <fstream>
 #include <nlohmann/json.hpp>
 
 #include "format/base/json_fields.h"
@@ -113,12 +112,12 @@ using Json = nlohmann::ordered_json;
 
 struct PredictionArguments {
   std::vector<std::string> packages;
-  std::string against, plan;
+  std::string against;
   std::vector<std::string> budgets;
   int plans = 20, views = 4, jobs = 0;
   double display_px = 512;
   std::uint64_t seed = 1;
-  bool every_scale = false, json = false;
+  bool json = false;
 };
 
 /// A plan, and what it looks like.
@@ -145,48 +144,16 @@ Row measured(PackageReader& package, PlanPictures& pictures, const DrawnPlan& dr
   return row;
 }
 
-/// What `texmesh plan --json` printed, of this package or of one with the same planes.
-ShownPackage read_plan(const std::string& path, PackageReader& package) {
-  std::ifstream in(path, std::ios::binary);
-  const Json j = Json::parse(in, nullptr, false);
-  if (j.is_discarded() || !j.contains("planes")) throw InputError(path, "", "output of plan --json", "other");
-  ShownPackage shown{j.at("scale").get<int>(), {}, {}};
-  if (j.contains("proxy")) shown.proxy = j.at("proxy").get<std::uint32_t>();
-  for (const Json& p : j.at("planes")) {
-    ShownPlane plane{{p.at("texture").get<std::uint32_t>(), p.at("plane").get<std::uint32_t>()}, {}};
-    for (const Json& rung : p.at("rungs"))
-      plane.rungs.push_back(rung.is_null() ? -1 : rung.get<std::int32_t>());
-    if (plane.choice.plane >= package.tables().planes.size())
-      throw InputError(path, "/planes", "planes of the package", std::to_string(plane.choice.plane));
-    shown.planes.push_back(std::move(plane));
-  }
-  return shown;
-}
-
-std::vector<int> scales_of(PackageReader& package) {
-  std::vector<int> numbers;
-  for (const ManifestScale& s : package.manifest().scales) numbers.push_back(s.scale);
-  return numbers;
-}
-
 std::vector<Row> rows_of(const PredictionArguments& args, const std::string& path) {
   PackageReader package(open_store(path));
   PlanPictures pictures(package, args.against, args.views, context_of(args.jobs));
   std::vector<Row> rows;
-  if (!args.plan.empty()) {
-    const ShownPackage shown = read_plan(args.plan, package);
-    rows.push_back({path, "plan", args.display_px, shown.scale, shown.proxy, 0, 0, 0, 0,
-                    pictures.measure(shown, args.display_px)});
-    return rows;
+  for (const std::string& budget : args.budgets) {
+    DrawnPlan given{DrawnKind::kBudget, {}, {}};
+    given.request.displayed_px = args.display_px;
+    given.plan = plan_budget(package, given.request, parse_bytes(budget, "--budget"));
+    rows.push_back(measured(package, pictures, given, "budget"));
   }
-  for (const std::string& budget : args.budgets)
-    for (const int scale : args.every_scale ? scales_of(package) : std::vector<int>{-1}) {
-      DrawnPlan given{DrawnKind::kBudget, {}, {}};
-      given.request.displayed_px = args.display_px;
-      given.request.scale = scale;
-      given.plan = plan_budget(package, given.request, parse_bytes(budget, "--budget"));
-      rows.push_back(measured(package, pictures, given, "budget"));
-    }
   if (rows.empty())
     for (const DrawnPlan& drawn : draw_plans(package, args.plans, args.seed))
       rows.push_back(measured(package, pictures, drawn, drawn_kind_name(drawn.kind)));
@@ -224,12 +191,6 @@ double rank_correlation(const std::vector<Row>& rows) {
   return aa > 0 && bb > 0 ? ab / std::sqrt(aa * bb) : 0;
 }
 
-double mean_error(const std::vector<Row>& rows) {
-  double sum = 0;
-  for (const Row& r : rows) sum += r.error();
-  return rows.empty() ? 0 : sum / static_cast<double>(rows.size());
-}
-
 Table prediction_table(const std::vector<Row>& rows) {
   Table table{"",
               {Column::text("package", "package"),
@@ -260,7 +221,9 @@ int run_prediction(const PredictionArguments& args) {
   for (const std::string& path : args.packages)
     for (Row& row : rows_of(args, path)) rows.push_back(std::move(row));
   const Table table = prediction_table(rows);
-  const double error = mean_error(rows), correlation = rank_correlation(rows);
+  double error = 0;
+  for (const Row& r : rows) error += r.error() / static_cast<double>(rows.size());
+  const double correlation = rank_correlation(rows);
   if (args.json)
     std::cout
         << Json{{"plans", table.json()}, {"mean_error", error}, {"rank_correlation", correlation}}.dump()
@@ -287,10 +250,7 @@ void add_prediction_study(Command& study) {
   c.option("--seed", args.seed, "Seed of the plans").shows_default();
   c.option("--budget", args.budgets,
            "What plan --budget chooses, instead of random plans; may be given again", "SIZE");
-  c.flag("--every-scale", args.every_scale,
-         "With --budget: the best of every scale, not only of the best one");
-  c.option("--plan", args.plan, "What plan --json printed, instead of random plans", "FILE");
-  c.option("--display", args.display_px, "Displayed height with --budget and --plan, px")
+  c.option("--display", args.display_px, "Displayed height with --budget, px")
       .number_in(16, 2048)
       .shows_default();
   c.option(

@@ -160,9 +160,8 @@ void add_rungs_study(Command& study) {
   c.notes(
       "A load: a link of 2 to 50 Mbit/s, an object of 200 to 2,000 px, a limit of 1 to 10 s, each drawn from a "
       "logarithmic scale; the same loads on every machine. What a load shows is what texmesh plan says.\n"
-      "\"plane shown\": loads that take this size of the texture; \"rung chosen\": loads in which a fragment "
-      "at least has the rung. compile stores the rungs that are worth their bytes in such loads "
-      "(--ladder.prune).\n"
+      "\"plane shown\": loads that take this size of the texture; \"rung chosen\": loads in which a fragment at "
+      "least has the rung. compile stores the rungs that are worth their bytes in such loads (--ladder.prune).\n"
       "Exit code: 0, 1 when a package cannot be read, 2 usage.");
 }
 

@@ -1,6 +1,8 @@
 // The documents of an experiment: design.json, which says what judges are asked, and what they answered.
 #include "lab/experiment/design.h"
 
+#include <fmt/format.h>
+
 #include <map>
 #include <set>
 #include <tuple>
@@ -46,20 +48,13 @@ class PictureNames {
   enum Role : std::uint8_t { kReference, kSame, kChanged };
   const std::string& of(std::uint32_t condition, std::uint32_t object, Role role, std::uint32_t level) {
     std::string& name = names_[{condition, object, role, level}];
-    while (name.empty()) {
-      static constexpr const char* kDigits = "0123456789abcdef";
-      std::string drawn;
-      for (std::uint64_t bits = random_.bits(); drawn.size() < kIdDigits; bits >>= 4)
-        drawn += kDigits[bits & 15];
-      if (used_.insert(drawn).second) name = drawn + ".png";
-    }
+    if (name.empty()) name = fmt::format("{:016x}.png", random_.bits());
     return name;
   }
 
  private:
   SplitMix random_;
   std::map<std::tuple<std::uint32_t, std::uint32_t, Role, std::uint32_t>, std::string> names_;
-  std::set<std::string> used_;
 };
 
 ExperimentTrial trial_of(const ExperimentDesign& design, std::uint32_t condition, std::uint32_t level,
@@ -67,8 +62,13 @@ ExperimentTrial trial_of(const ExperimentDesign& design, std::uint32_t condition
   ExperimentTrial t;
   t.condition = condition, t.object = object, t.level_index = level;
   t.is_catch = level == design.levels.size();
-  t.level = t.is_catch ? kCatchLevel : design.levels[level];
+  t.level = !t.is_catch ? design.levels[level] : design.options.move ? 0 : kCatchLevel;
   t.reference = names.of(condition, object, PictureNames::kReference, 0);
+  if (design.options.move) {
+    for (std::uint32_t place = 0; place < design.conditions.size(); ++place)
+      t.moved.push_back(names.of(place, object, PictureNames::kChanged, level));
+    return t;
+  }
   t.same = names.of(condition, object, PictureNames::kSame, 0);
   t.changed = names.of(condition, object, PictureNames::kChanged, level);
   return t;
@@ -107,13 +107,15 @@ std::vector<std::uint32_t> draw_order(const ExperimentDesign& design, const Cell
 
 Json trials_json(const ExperimentDesign& design) {
   Json list = Json::array();
-  for (const ExperimentTrial& t : design.trials)
-    list.push_back({{"condition", t.condition},
-                    {"level", t.level},
-                    {"catch", t.is_catch},
-                    {"reference", t.reference},
-                    {"same", t.same},
-                    {"changed", t.changed}});
+  for (const ExperimentTrial& t : design.trials) {
+    Json trial{
+        {"condition", t.condition}, {"level", t.level}, {"catch", t.is_catch}, {"reference", t.reference}};
+    if (t.moved.empty())
+      trial["same"] = t.same, trial["changed"] = t.changed;
+    else
+      trial["moved"] = t.moved;
+    list.push_back(std::move(trial));
+  }
   return list;
 }
 
@@ -152,11 +154,14 @@ DesignKey key_of(const nlohmann::json& root, const std::string& file) {
   key.kind = at["kind"].text(20);
   std::vector<double> sizes;
   const JsonAt conditions = at["conditions"], trials = at["trials"];
-  for (std::size_t c = 0, n = conditions.array(1, kMostSizes); c < n; ++c)
+  for (std::size_t c = 0, n = conditions.array(1, kPlaces); c < n; ++c)
     sizes.push_back(conditions[c]["displayed_px"].number(1, 100000));
+  const bool moves = trials.array(1, kMostTrials) > 0 && trials[0].has("moved");
   for (std::size_t t = 0, n = trials.array(1, kMostTrials); t < n; ++t)
     key.trials.push_back({sizes[trials[t]["condition"].integer(0, sizes.size() - 1)],
-                          trials[t]["level"].number(kLeastLevel, kMostLevel), trials[t]["catch"].boolean()});
+                          trials[t]["level"].number(moves ? 0 : kLeastLevel, kMostLevel),
+                          trials[t]["catch"].boolean()});
+  if (moves) key.places_px = sizes;
   return key;
 }
 
@@ -169,7 +174,8 @@ void plan_trials(ExperimentDesign& design) {
   const auto levels = static_cast<std::uint32_t>(design.levels.size());
   const auto objects = static_cast<std::uint32_t>(o.kind == StimulusKind::kMesh ? 1 : o.objects);
   Cells cells;
-  for (std::uint32_t c = 0; c < design.conditions.size(); ++c)
+  // What moves is asked once, not at every place.
+  for (std::uint32_t c = 0; c < (o.move ? 1 : design.conditions.size()); ++c)
     for (std::uint32_t level = 0; level <= levels; ++level) {
       const auto count = static_cast<std::uint32_t>(level < levels ? o.repeats : o.catches);
       for (std::uint32_t k = 0; k < count; ++k) {
@@ -205,10 +211,10 @@ constexpr std::size_t kMaxName = 32;
 constexpr double kMostMs = 1e8;
 
 /// One of two words; true for the second.
-bool read_side(const JsonAt& at) {
-  const std::string side = at.text(10);
-  if (side != "left" && side != "right") at.fail("left or right", side);
-  return side == "right";
+bool read_choice(const JsonAt& at, const std::string& first, const std::string& second) {
+  const std::string word = at.text(10);
+  if (word != first && word != second) at.fail(first + " or " + second, word);
+  return word == second;
 }
 
 std::string read_word(const JsonAt& at, std::size_t most, std::string_view characters) {
@@ -234,15 +240,21 @@ void check_display(const nlohmann::json& display, const JsonAt& at) {
   at["touch"].boolean();
 }
 
-ExperimentAnswer read_answer(const nlohmann::json& answer, const JsonAt& at, std::uint32_t trials) {
-  check_field_names(answer, {"trial", "displayed_px", "level", "catch", "side", "chosen", "ms", "late"}, at);
+ExperimentAnswer read_answer(const nlohmann::json& answer, const JsonAt& at, const ExperimentResults& of) {
+  const std::size_t places = of.places_px.size();
+  check_field_names(answer,
+                    {"trial", "displayed_px", "level", "catch", "ms", "late", places ? "began" : "side",
+                     places ? "place" : "chosen"},
+                    at);
   ExperimentAnswer out;
-  out.trial = static_cast<std::uint32_t>(at["trial"].integer(0, trials - 1));
+  out.trial = static_cast<std::uint32_t>(at["trial"].integer(0, of.trials - 1));
   out.displayed_px = at["displayed_px"].number(1, 100000);
-  out.level = at["level"].number(kLeastLevel, kMostLevel);
+  out.level = at["level"].number(places ? 0 : kLeastLevel, kMostLevel);
   out.is_catch = at["catch"].boolean();
-  out.same_on_right = read_side(at["side"]);
-  out.chose_right = read_side(at["chosen"]);
+  out.same_on_right =
+      places ? read_choice(at["began"], "near", "far") : read_choice(at["side"], "left", "right");
+  if (places) out.place = static_cast<std::uint32_t>(at["place"].integer(0, places - 1));
+  out.chose_right = places ? 2 * out.place >= places : read_choice(at["chosen"], "left", "right");
   out.seconds = at["ms"].number(0, kMostMs) / 1000;
   out.late = at["late"].boolean();
   return out;
@@ -254,7 +266,9 @@ ExperimentResults results_of(const nlohmann::json& root, const std::string& file
   const JsonAt at(root, file);
   at["version"].integer(1, 1);
   check_field_names(
-      root, {"version", "design", "kind", "judge", "order", "date", "display", "trials", "answers"}, at);
+      root,
+      {"version", "design", "kind", "judge", "order", "date", "display", "trials", "places_px", "answers"},
+      at);
   ExperimentResults out;
   out.file = file;
   out.design = read_word(at["design"], 16, kHex);
@@ -267,10 +281,13 @@ ExperimentResults results_of(const nlohmann::json& root, const std::string& file
   at["date"].text(10);
   check_display(root["display"], at["display"]);
   out.trials = static_cast<std::uint32_t>(at["trials"].integer(1, kMostTrials));
+  if (at.has("places_px"))
+    for (std::size_t k = 0, n = at["places_px"].array(2, kPlaces); k < n; ++k)
+      out.places_px.push_back(at["places_px"][k].number(1, k == 0 ? 100000 : out.places_px.back()));
   const JsonAt answers = at["answers"];
   std::set<std::uint32_t> seen;
   for (std::size_t k = 0, n = answers.array(0, out.trials); k < n; ++k) {
-    out.answers.push_back(read_answer(root["answers"][k], answers[k], out.trials));
+    out.answers.push_back(read_answer(root["answers"][k], answers[k], out));
     if (!seen.insert(out.answers.back().trial).second)
       answers[k]["trial"].fail("each trial once", std::to_string(out.answers.back().trial) + " again");
   }

@@ -18,6 +18,8 @@ inline std::string_view name_of(StimulusKind kind) { return kStimulusKinds[stati
 inline constexpr double kCatchLevel = 0.45;
 inline constexpr double kLeastLevel = 0.001, kMostLevel = 1;
 inline constexpr std::size_t kMostLevels = 20, kMostSizes = 6;
+/// Where a moved object stands (6.2: 0 to -20): each place shows it 2^(1/5) smaller than the one before.
+inline constexpr std::size_t kPlaces = 21, kPlacesAnOctave = 5;
 inline constexpr int kMostObjects = 40, kMostRepeats = 60, kMostCatches = 60;
 inline constexpr std::uint32_t kMostTrials = 5000;
 
@@ -25,6 +27,7 @@ struct ExperimentOptions {
   StimulusKind kind = StimulusKind::kQuadrics;
   std::string title, consent;  // plain text
   std::string post_url;        // "" = results are not posted
+  bool move = false;           // judges move one object until both look alike (6.2); one size, the nearest
   std::vector<double> sizes_px{160};
   std::vector<double> levels;  // rising; empty: those of the kind
   int objects = 6;             // ellipsoids or quadrics
@@ -42,13 +45,14 @@ struct ExperimentCondition {
   std::uint32_t frame_px = 0;  // side of the picture
 };
 
-/// "Which of the two is the same as the reference?"
+/// "Which of the two is the same as the reference?", or where the changed one looks like the reference.
 struct ExperimentTrial {
   std::uint32_t condition = 0, object = 0;
   std::uint32_t level_index = 0;  // of the levels; their number for catch trials
-  double level = 0;
+  double level = 0;               // 0: catch trials of moves, whose object is unchanged
   bool is_catch = false;
   std::string reference, same, changed;  // files beneath stimuli/
+  std::vector<std::string> moved;        // instead of the last two: at every place (condition)
 };
 
 /// design.json, which the page reads: lab/schemas/experiment-design.v1.schema.json.
@@ -59,7 +63,8 @@ struct ExperimentDesign {
   std::vector<ExperimentCondition> conditions;
   std::vector<double> levels;
   std::vector<ExperimentTrial> trials;
-  /// Each: every trial once, as 2 x trial + (1 where the unchanged one stands on the right).
+  /// Each: every trial once, as 2 x trial + (1 where the unchanged one stands on the right, or where the
+  /// moved one begins at the farthest place).
   std::vector<std::vector<std::uint32_t>> orders;
 };
 
@@ -79,6 +84,7 @@ struct DesignKey {
     bool is_catch = false;
   };
   std::string id, kind;
+  std::vector<double> places_px;  // of moves; else empty
   std::vector<Trial> trials;
 };
 /// Reads a design.json. InputError {file, JSON pointer, ...} when it is none, or was changed after it was
@@ -92,7 +98,8 @@ struct ExperimentAnswer {
   std::uint32_t trial = 0;  // of the design
   double displayed_px = 0, level = 0;
   bool is_catch = false;
-  bool same_on_right = false, chose_right = false;
+  bool same_on_right = false, chose_right = false;  // of moves: began, ended in the farther half
+  std::uint32_t place = 0;                          // of moves: where it looks like the reference
   double seconds = 0;
   bool late = false;  // after the time limit
   bool right() const { return same_on_right == chose_right; }
@@ -104,7 +111,8 @@ struct ExperimentResults {
   std::string file;    // for reports
   std::string design;  // its id
   std::string kind, judge;
-  std::uint32_t trials = 0;  // of the whole experiment
+  std::uint32_t trials = 0;       // of the whole experiment
+  std::vector<double> places_px;  // of moves: displayed sizes, falling; else empty
   std::vector<ExperimentAnswer> answers;
 };
 

@@ -15,6 +15,7 @@
 namespace texmesh {
 namespace {
 
+using Matches = decltype(ExperimentFit::matches);
 /// What every file must say of a trial.
 using TrialKeys = std::map<std::uint32_t, DesignKey::Trial>;
 
@@ -49,6 +50,8 @@ void check_files(const std::vector<ExperimentResults>& results, const std::optio
       throw InputError(r.file, "/trials", std::to_string(trials), std::to_string(r.trials));
     if (r.kind != (key ? key->kind : first.kind))
       throw InputError(r.file, "/kind", key ? key->kind : first.kind, r.kind);
+    if (r.places_px != (key ? key->places_px : first.places_px))
+      throw InputError(r.file, "/places_px", "the places of the experiment", "others");
     check_trials(r, keys);
   }
 }
@@ -56,11 +59,14 @@ void check_files(const std::vector<ExperimentResults>& results, const std::optio
 FittedJudge screened(const ExperimentResults& results, const JudgeLimits& limits) {
   FittedJudge judge{results.file, results.judge, {}, 0, 0, JudgeVerdict::kKept, false};
   for (const ExperimentAnswer& a : results.answers) {
+    const bool moved = !results.places_px.empty();
+    // An unchanged object looks alike where it is nearest; half of the objects begin in the farther half.
+    const bool right = moved ? !a.is_catch || a.place <= kPlacesAnOctave : a.right();
     ++judge.counts.answers;
-    judge.counts.left += !a.chose_right;
+    judge.counts.left += moved ? a.right() : !a.chose_right;
     judge.counts.catches += a.is_catch;
-    judge.counts.caught += a.is_catch && a.right();
-    judge.right += a.right();
+    judge.counts.caught += a.is_catch && right;
+    judge.right += right;
     judge.late += a.late;
   }
   judge.verdict = screen_judge(judge.counts, limits);
@@ -69,14 +75,19 @@ FittedJudge screened(const ExperimentResults& results, const JudgeLimits& limits
 
 JudgeTable table_of(const ExperimentResults& results, const std::vector<double>& sizes_px) {
   std::vector<std::map<double, LevelCount>> counts(sizes_px.size());
+  const auto add = [&counts](std::size_t size, double level, std::uint32_t answers, std::uint32_t right) {
+    LevelCount& count = counts[size][level];
+    count.level = level, count.answers += answers, count.right += right;
+  };
   for (const ExperimentAnswer& a : results.answers) {
     if (a.is_catch) continue;
-    const auto c =
-        static_cast<std::size_t>(std::ranges::lower_bound(sizes_px, a.displayed_px) - sizes_px.begin());
-    LevelCount& count = counts[c][a.level];
-    count.level = a.level;
-    ++count.answers;
-    count.right += a.right();
+    // A move tells of every size whether a difference is seen. Who sees none and has to choose is right once
+    // in two.
+    for (std::size_t c = 0; c < sizes_px.size(); ++c)
+      if (!results.places_px.empty())
+        add(c, a.level, 2, sizes_px[c] > results.places_px[a.place] ? 2 : 1);
+      else if (sizes_px[c] == a.displayed_px)
+        add(c, a.level, 1, a.right());
   }
   JudgeTable out;
   for (const auto& by_level : counts) {
@@ -94,6 +105,30 @@ std::vector<double> sizes_of(const std::vector<const ExperimentResults*>& kept) 
   std::ranges::sort(sizes);
   sizes.erase(std::ranges::unique(sizes).begin(), sizes.end());
   return sizes;
+}
+
+/// Of a move's sizes those at which some changes are seen and others are not; all where there are none.
+std::vector<double> telling_sizes(const std::vector<const ExperimentResults*>& kept, const Matches& matches) {
+  std::vector<double> sizes;
+  for (const double px : kept.front()->places_px)
+    if (px < matches.front().second.value && px > matches.back().second.value) sizes.push_back(px);
+  if (sizes.empty()) sizes = kept.front()->places_px;
+  std::ranges::reverse(sizes);
+  return sizes;
+}
+
+Matches matches_of(const std::vector<const ExperimentResults*>& kept) {
+  std::map<double, std::vector<double>> sizes;
+  for (const ExperimentResults* r : kept)
+    for (const ExperimentAnswer& a : r->answers)
+      if (!a.is_catch && !r->places_px.empty()) sizes[a.level].push_back(r->places_px[a.place]);
+  Matches out;
+  for (auto& [level, px] : sizes) {
+    std::ranges::sort(px);
+    const auto at = [&px = px](std::size_t quarter) { return px[(px.size() - 1) * quarter / 4]; };
+    out.push_back({{level, static_cast<std::uint32_t>(px.size()), 0}, {at(2), at(1), at(3)}});
+  }
+  return out;
 }
 
 std::string bounds_text(const Estimate& e, int digits) {
@@ -188,14 +223,23 @@ ExperimentFit fit_experiment(const std::vector<ExperimentResults>& results,
       return other->answers == r.answers;
     });
     fit.judges.push_back(judge);
-    if (judge.kept()) kept.push_back(&r);
+    if (judge.kept()) kept.push_back(&r), fit.answers += judge.counts.answers - judge.counts.catches;
   }
-  fit.sizes_px = sizes_of(kept);
+  fit.matches = matches_of(kept);
+  fit.sizes_px = fit.matches.empty() ? sizes_of(kept) : telling_sizes(kept, fit.matches);
   if (kept.empty() || fit.sizes_px.empty()) fail_without_judges(fit);
+  const bool by_judges = kept.size() >= kLeastJudgesToDraw;
   std::vector<JudgeTable> tables;
-  for (const ExperimentResults* r : kept) tables.push_back(table_of(*r, fit.sizes_px));
+  for (const ExperimentResults* r : kept) {
+    // What a move tells of all sizes is drawn as one.
+    ExperimentResults one = *r;
+    for (std::size_t k = 0, n = by_judges || r->places_px.empty() ? 1 : r->answers.size(); k < n; ++k) {
+      if (n > 1) one.answers = {r->answers[k]};
+      tables.push_back(table_of(one, fit.sizes_px));
+    }
+  }
   fit.study = study_thresholds(tables, fit.sizes_px, options.draws, options.seed, context);
-  for (const LevelCount& c : fit.study.pooled.counts) fit.answers += c.answers;
+  fit.study.by_judges = by_judges;
   fit.reference_px = std::round(fit.study.law.reference_px);
   if (options.curve == FittedCurve::kLine)
     judge_line(fit);
@@ -239,34 +283,27 @@ Json condition_json(const ConditionFit& c, double displayed_px) {
           {"levels", std::move(levels)}};
 }
 
-Json judge_json(const FittedJudge& j) {
-  return {{"file", j.file},           {"judge", j.judge},
-          {"verdict", word_of(j)},    {"answers", j.counts.answers},
-          {"right", j.right},         {"left", j.counts.left},
-          {"late", j.late},           {"catches", j.counts.catches},
-          {"caught", j.counts.caught}};
-}
-
 std::string method_text(const ExperimentFit& fit) {
   return fmt::format(
-      "{} judges ({} left out), {} answers to {}, 2AFC with reference, 75 % of a {}, 95 % bounds {:.4f} to "
-      "{:.4f}; experiment {}",
+      "{} judges ({} left out), {} answers to {}, {}, 75 % of a {}, 95 % bounds {:.4f} to {:.4f}; experiment {}",
       fit.kept(), fit.judges.size() - fit.kept(), fit.answers, fit.kind,
+      fit.matches.empty() ? "2AFC with reference" : "moved until alike",
       fit.options.curve == FittedCurve::kLine ? "line" : "sigmoid", fit.jnd.low, fit.jnd.high, fit.design);
 }
 
 Table judges_table(const ExperimentFit& fit) {
-  Table table("One row a file of results", {Column::text("judge"),
-                                            "answers",
-                                            {"right %", percent_form(0)},
-                                            {"left %", percent_form(0)},
-                                            "late",
-                                            "catch trials right",
-                                            Column::text("verdict")});
+  Table table("One row a file of results",
+              {Column::data("file"), Column::text("judge", "judge"), {"answers", 0, "answers"}});
+  table.column({"right %", 0, "right"}), table.column({"left %", 0, "left"});
+  table.column({"late", 0, "late"}), table.column({"catch trials right", 0, "caught"});
+  table.column(Column::data("catches")), table.column(Column::text("verdict", "verdict"));
   for (const FittedJudge& j : fit.judges) {
-    const double n = std::max(j.counts.answers, 1u);
-    table.row({j.judge, j.counts.answers, j.right / n, j.counts.left / n, j.late,
-               fmt::format("{} of {}", j.counts.caught, j.counts.catches), verdict_text(j)});
+    const auto of_all = [&j](std::uint32_t part) {
+      return Cell(part, fmt::format("{:.0f}", 100.0 * part / std::max(j.counts.answers, 1u)));
+    };
+    table.row({j.file, j.judge, j.counts.answers, of_all(j.right), of_all(j.counts.left), j.late,
+               Cell(j.counts.caught, fmt::format("{} of {}", j.counts.caught, j.counts.catches)),
+               j.counts.catches, Cell(word_of(j), verdict_text(j))});
   }
   return table;
 }
@@ -294,6 +331,18 @@ Table conditions_table(const ExperimentFit& fit) {
   return table;
 }
 
+Table matches_table(const ExperimentFit& fit) {
+  Table table(
+      "Where a changed object looks like the unchanged one (6.2), in px; half of the answers lie between",
+      {{"change", kShortest, "level"},
+       {"answers", 0, "answers"},
+       {"median", 1, "displayed_px"},
+       {"from", 1, "low_px"},
+       {"to", 1, "high_px"}});
+  for (const auto& [of, px] : fit.matches) table.row({of.level, of.answers, px.value, px.low, px.high});
+  return table;
+}
+
 }  // namespace
 
 std::string jnd_profile_json(const ExperimentFit& fit) {
@@ -308,8 +357,7 @@ std::string jnd_profile_json(const ExperimentFit& fit) {
 }
 
 std::string fit_json(const ExperimentFit& fit) {
-  Json judges = Json::array(), conditions = Json::array();
-  for (const FittedJudge& j : fit.judges) judges.push_back(judge_json(j));
+  Json conditions = Json::array();
   for (std::size_t c = 0; c < fit.sizes_px.size(); ++c)
     conditions.push_back(condition_json(fit.study.conditions[c], fit.sizes_px[c]));
   const Json out{{"version", 1},
@@ -326,14 +374,16 @@ std::string fit_json(const ExperimentFit& fit) {
                  {"answers", fit.answers},
                  {"draws", fit.options.draws},
                  {"drawn", fit.study.by_judges ? "judges" : "answers"},
-                 {"judges", std::move(judges)},
+                 {"judges", judges_table(fit).json()},
+                 {"matches", matches_table(fit).json()},
                  {"conditions", std::move(conditions)}};
   return out.dump(-1, ' ', false, Json::error_handler_t::replace);
 }
 
 std::string fit_text(const ExperimentFit& fit) {
-  return fmt::format("Experiment {}, {}: {} of {} judges, {} answers\n{}\n{}\n{}\n{}\n", fit.design, fit.kind,
-                     fit.kept(), fit.judges.size(), fit.answers, judges_table(fit).text(),
+  return fmt::format("Experiment {}, {}: {} of {} judges, {} answers\n{}\n{}{}\n{}\n{}\n", fit.design,
+                     fit.kind, fit.kept(), fit.judges.size(), fit.answers, judges_table(fit).text(),
+                     fit.matches.empty() ? "" : matches_table(fit).text() + "\n",
                      conditions_table(fit).text(), fit.verdict, fit.distance_verdict);
 }
 
@@ -344,11 +394,15 @@ constexpr int kCurvePoints = 80;
 /// Shares of right answers at one displayed size, with both curves; levels in percent.
 std::string condition_plot(const ConditionFit& fit, double displayed_px) {
   const double low = fit.counts.front().level, high = std::max(fit.counts.back().level, 1.01 * low);
-  Plot plot;
-  plot.title = fmt::format("share of right answers against the change, {:g} px", displayed_px);
-  plot.x_name = "change [%]";
-  plot.y_name = "right answers [%]";
-  plot.x_low = 100 * low / 1.2, plot.x_high = 100 * high * 1.2, plot.y_high = 100;
+  Plot plot{fmt::format("share of right answers against the change, {:g} px", displayed_px),
+            "change [%]",
+            "right answers [%]",
+            100 * low / 1.2,
+            100 * high * 1.2,
+            100,
+            0,
+            false,
+            {}};
   PlotSeries answers{"", "a", {}, false, false, true},
       sigmoid{"answers and sigmoid", "a", {}, false, false, false}, line{"line", "b", {}, false, true, false},
       quarter{"75 %", "q", {}, false, true, false};
@@ -367,18 +421,21 @@ std::string condition_plot(const ConditionFit& fit, double displayed_px) {
 }
 
 std::string distance_plot(const ExperimentFit& fit) {
-  Plot plot;
-  plot.title = "threshold against the displayed size";
-  plot.x_name = "displayed size [px]";
-  plot.y_name = "just noticeable change [%]";
-  plot.x_low = fit.sizes_px.front() / 1.2, plot.x_high = fit.sizes_px.back() * 1.2;
+  Plot plot{"threshold against the displayed size",
+            "displayed size [px]",
+            "just noticeable change [%]",
+            fit.sizes_px.front() / 1.2,
+            fit.sizes_px.back() * 1.2,
+            0,
+            0,
+            false,
+            {}};
   const auto law = [&](double exponent, double px) {
     return 100 * fit.study.law.jnd.value *
            portable::exp(exponent * portable::log(fit.study.law.reference_px / px));
   };
   PlotSeries found{"thresholds", "a", {}, false, false, true},
       printed{"as printed", "c", {}, false, true, false}, inverse{"512 / D", "b", {}, false, true, false};
-  plot.y_high = 0;
   for (std::size_t c = 0; c < fit.sizes_px.size(); ++c) {
     const Estimate& t = fit.study.conditions[c].threshold;
     found.points.emplace_back(fit.sizes_px[c], 100 * t.value);
@@ -394,6 +451,27 @@ std::string distance_plot(const ExperimentFit& fit) {
   return plot.svg();
 }
 
+/// Fig. 6.4.
+std::string matches_plot(const ExperimentFit& fit) {
+  Plot plot{"size at which a changed object looks like the unchanged one, against the change",
+            "change [%]",
+            "displayed size [px]",
+            100 * fit.matches.front().first.level / 1.2,
+            100 * fit.matches.back().first.level * 1.2,
+            0,
+            0,
+            false,
+            {}};
+  PlotSeries medians{"median", "a", {}, false, false, true};
+  for (const auto& [of, px] : fit.matches) {
+    medians.points.emplace_back(100 * of.level, px.value);
+    plot.series.push_back({"", "a", {{100 * of.level, px.low}, {100 * of.level, px.high}}, true});
+    plot.y_high = std::max(plot.y_high, px.high);
+  }
+  plot.series.push_back(medians);
+  return plot.svg();
+}
+
 }  // namespace
 
 std::string fit_page(const ExperimentFit& fit) {
@@ -403,6 +481,9 @@ std::string fit_page(const ExperimentFit& fit) {
       "with replacement.</p></div></header>\n<main>\n",
       fit.kept(), fit.found ? "" : " bad", markup_escaped(fit.verdict), markup_escaped(fit.distance_verdict),
       fit.design, fit.kind, fit.answers, fit.options.draws, fit.study.by_judges ? "judges" : "answers");
+  if (!fit.matches.empty())
+    body += html_section("matches", "Where both look alike",
+                         "<figure>" + matches_plot(fit) + "</figure>\n" + matches_table(fit).html());
   std::string curves;
   for (std::size_t c = 0; c < fit.sizes_px.size(); ++c) {
     const ConditionFit& f = fit.study.conditions[c];

@@ -34,6 +34,9 @@ struct ExperimentFit {
   std::vector<double> sizes_px;     // rising
   ThresholdStudy study;
   std::uint64_t answers = 0;  // of kept judges, without catch trials
+  /// Of moves: at which size, px, each level looks like the reference (Fig. 6.4): the median, and the bounds
+  /// between which half of the answers lie.
+  std::vector<std::pair<LevelCount, Estimate>> matches;
   std::size_t kept() const;
 
   // What the profile says:

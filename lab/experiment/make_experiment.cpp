@@ -18,6 +18,7 @@
 #include "pipeline/io/uri.h"
 #include "stages/image/png_writer.h"
 #include "stages/render/shade.h"
+#include "tools/cli/options/units.h"
 #include "tools/extract/package_model.h"
 #include "tools/publish/pages/page.h"
 
@@ -304,6 +305,9 @@ std::map<Wanted, std::vector<std::string>> wanted_pictures(const ExperimentDesig
   };
   for (const ExperimentTrial& t : design.trials) {
     add({t.condition, t.object, 0}, t.reference);
+    for (std::uint32_t place = 0; place < t.moved.size(); ++place)
+      add({place, t.object, t.is_catch ? 0 : t.level_index + 1}, t.moved[place]);
+    if (!t.moved.empty()) continue;
     add({t.condition, t.object, 0}, t.same);
     add({t.condition, t.object, t.level_index + 1}, t.changed);
   }
@@ -385,10 +389,10 @@ void check_pictures(const ExperimentOptions& options, const StimulusSet& stimuli
   for (const double px : options.sizes_px) {
     const std::uint32_t side_px = frame_px(stimuli, px);
     if (side_px > kMostFramePx)
-      throw InputError("--sizes", "", fmt::format("a picture of at most {} px", kMostFramePx),
+      throw UsageError("--sizes", "", fmt::format("a picture of at most {} px", kMostFramePx),
                        fmt::format("{} px for a displayed size of {:g} px", side_px, px));
     if (side_px * views > kMostStripPx)
-      throw InputError("--views", "",
+      throw UsageError("--views", "",
                        fmt::format("at most {} views of {} px", kMostStripPx / side_px, side_px),
                        std::to_string(views));
   }
@@ -401,7 +405,13 @@ Experiment make_experiment(const ExperimentOptions& options, const StimulusSet& 
   ExperimentDesign& design = experiment.design;
   design.options = options;
   design.levels = stimuli.levels;
-  for (const double px : options.sizes_px) design.conditions.push_back({px, frame_px(stimuli, px)});
+  for (const double px : options.sizes_px)
+    for (std::size_t place = 0; place < (options.move ? kPlaces : 1); ++place) {
+      const double nearer = static_cast<double>(place) / static_cast<double>(kPlacesAnOctave);
+      const double shown_px =
+          place == 0 ? px : std::round(1000 * px / portable::exp(nearer * portable::log(2))) / 1000;
+      design.conditions.push_back({shown_px, frame_px(stimuli, shown_px)});
+    }
   const RenderEnvironment environment = studio_environment();
   design.background = background_of(environment);
   plan_trials(design);

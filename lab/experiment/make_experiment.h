@@ -66,7 +66,7 @@ struct Experiment {
 /// Longest side of a strip of views, px: what browsers decode everywhere.
 inline constexpr std::uint32_t kMostStripPx = 16384;
 
-/// InputError naming the option, --sizes or --views, when a picture would be too large.
+/// UsageError naming the option, --sizes or --views, when a picture would be too large.
 void check_pictures(const ExperimentOptions& options, const StimulusSet& stimuli);
 
 /// Renders every stimulus with the reference renderer in the light of all measurements, from `views`

@@ -73,69 +73,32 @@ double log_likelihood(std::span<const LevelCount> counts, const Psychometric& cu
   return sum;
 }
 
-/// The simplex of Nelder and Mead (1965) within the box.
-class Simplex {
- public:
-  Simplex(std::span<const LevelCount> counts, const Box& box, const Vertex& start)
-      : counts_(counts), box_(box) {
-    vertices_[0] = start;
-    const Place step{0.15, 0.25, 0.02};
-    for (std::size_t k = 0; k < 3; ++k) {
-      Place p = start.place;
-      p[k] += p[k] + step[k] > box.high[k] ? -step[k] : step[k];
-      vertices_[k + 1] = at(p);
+/// Hooke and Jeeves (1961), within the box: a step along each axis that makes it better, once more in that
+/// direction, and half as long where none does.
+Vertex descended(std::span<const LevelCount> counts, const Box& box, Vertex best) {
+  const auto at = [&](const Place& p) {
+    const Place inside = box.clamp(p);
+    return Vertex{inside, -log_likelihood(counts, curve_at(inside))};
+  };
+  for (Place step{0.15, 0.25, 0.02}; step[0] > 1e-6;) {
+    Vertex tried = best;
+    for (std::size_t k = 0; k < 3; ++k)
+      for (const double way : {1.0, -1.0}) {
+        Place p = tried.place;
+        p[k] += way * step[k];
+        if (const Vertex v = at(p); v.value < tried.value) tried = v;
+      }
+    if (tried.value > best.value - 1e-9) {
+      for (double& s : step) s /= 2;
+      continue;
     }
+    Place p = tried.place;
+    for (std::size_t k = 0; k < 3; ++k) p[k] += tried.place[k] - best.place[k];
+    const Vertex further = at(p);
+    best = further.value < tried.value ? further : tried;
   }
-  Vertex descend() {
-    for (int i = 0; i < 400; ++i) {
-      std::ranges::stable_sort(vertices_, {}, &Vertex::value);
-      if (vertices_[3].value - vertices_[0].value < 1e-9) break;
-      step();
-    }
-    return *std::ranges::min_element(vertices_, {}, &Vertex::value);
-  }
-
- private:
-  Vertex at(const Place& p) const {
-    const Place inside = box_.clamp(p);
-    return {inside, -log_likelihood(counts_, curve_at(inside))};
-  }
-  /// From the worst vertex through the middle of the others, `factor` of the way beyond it.
-  Vertex beyond(double factor) const {
-    Place p{};
-    for (std::size_t k = 0; k < 3; ++k) {
-      const double middle = (vertices_[0].place[k] + vertices_[1].place[k] + vertices_[2].place[k]) / 3;
-      p[k] = middle + factor * (middle - vertices_[3].place[k]);
-    }
-    return at(p);
-  }
-  void step() {
-    const Vertex reflected = beyond(1);
-    if (reflected.value < vertices_[0].value) {
-      const Vertex expanded = beyond(2);
-      vertices_[3] = expanded.value < reflected.value ? expanded : reflected;
-    } else if (reflected.value < vertices_[2].value) {
-      vertices_[3] = reflected;
-    } else {
-      const Vertex contracted = beyond(reflected.value < vertices_[3].value ? 0.5 : -0.5);
-      if (contracted.value < std::min(reflected.value, vertices_[3].value))
-        vertices_[3] = contracted;
-      else
-        shrink();
-    }
-  }
-  void shrink() {
-    for (std::size_t v = 1; v < 4; ++v) {
-      Place p{};
-      for (std::size_t k = 0; k < 3; ++k) p[k] = (vertices_[v].place[k] + vertices_[0].place[k]) / 2;
-      vertices_[v] = at(p);
-    }
-  }
-
-  std::span<const LevelCount> counts_;
-  const Box& box_;
-  std::array<Vertex, 4> vertices_;
-};
+  return best;
+}
 
 /// The best of a coarse grid, so that the descent begins in the right valley.
 Vertex best_of_grid(std::span<const LevelCount> counts, const Box& box) {
@@ -191,8 +154,7 @@ PsychometricFit fit_psychometric(std::span<const LevelCount> counts) {
   const double least = all.front().level, most = all.back().level;
   const Box box{{portable::log(least / 4), portable::log(0.5), 0},
                 {portable::log(most * 4), portable::log(20), kMostLapses}};
-  Vertex best = best_of_grid(all, box);
-  for (int again = 0; again < 2; ++again) best = Simplex(all, box, best).descend();
+  const Vertex best = descended(all, box, best_of_grid(all, box));
   PsychometricFit fit;
   fit.curve = curve_at(best.place);
   fit.log_likelihood = -best.value;
@@ -221,26 +183,20 @@ namespace {
 
 using Counts = std::vector<LevelCount>;
 
-Counts summed(const std::vector<const Counts*>& parts) {
-  Counts all;
-  for (const Counts* part : parts) all.insert(all.end(), part->begin(), part->end());
-  return merge_levels(all);
-}
-
 std::vector<Counts> by_condition(const std::vector<const JudgeTable*>& judges, std::size_t conditions) {
-  std::vector<Counts> out;
+  std::vector<Counts> out(conditions);
   for (std::size_t c = 0; c < conditions; ++c) {
-    std::vector<const Counts*> parts;
-    for (const JudgeTable* judge : judges) parts.push_back(&judge->conditions[c]);
-    out.push_back(summed(parts));
+    for (const JudgeTable* judge : judges)
+      out[c].insert(out[c].end(), judge->conditions[c].begin(), judge->conditions[c].end());
+    out[c] = merge_levels(out[c]);
   }
   return out;
 }
 
 Counts pooled(const std::vector<Counts>& conditions) {
-  std::vector<const Counts*> parts;
-  for (const Counts& c : conditions) parts.push_back(&c);
-  return summed(parts);
+  Counts all;
+  for (const Counts& c : conditions) all.insert(all.end(), c.begin(), c.end());
+  return merge_levels(all);
 }
 
 /// As many answers again, each right as likely as an answer was.

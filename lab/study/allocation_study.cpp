@@ -12,6 +12,7 @@
 #include "stages/measure/flip.h"
 #include "stages/measure/fragment_meter.h"
 #include "stages/render/shade.h"
+#include "tools/render/rendered_model.h"
 
 namespace texmesh {
 namespace {
@@ -349,10 +350,9 @@ std::vector<StudiedChoice> study_allocation(
 
 Pixels side_by_side(const std::vector<const StudiedChoice*>& choices) {
   const std::uint32_t side = choices.at(0)->picture.width_px;
-  Pixels out{side * static_cast<std::uint32_t>(choices.size()), side, 3, {}};
-  for (std::uint32_t y = 0; y < side; ++y)
-    for (const StudiedChoice* c : choices)
-      out.data.insert(out.data.end(), c->picture.at(0, y), c->picture.at(0, y) + std::size_t{side} * 3);
+  const auto count = static_cast<std::uint32_t>(choices.size());
+  Pixels out{side * count, side, 3, std::vector<std::uint8_t>(std::size_t{side} * count * side * 3)};
+  for (std::uint32_t k = 0; k < count; ++k) paste(choices[k]->picture, k * side, 0, out);
   return out;
 }
 

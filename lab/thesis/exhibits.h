@@ -16,6 +16,11 @@ struct EnumNames<Verdict> {
                                                          "not comparable"};
 };
 
+/// Neither: in part.
+inline Verdict verdict_of(bool confirmed, bool not_confirmed) {
+  return confirmed ? Verdict::kConfirmed : not_confirmed ? Verdict::kNotConfirmed : Verdict::kInPart;
+}
+
 /// A picture that stands in a file beside the page.
 struct ExhibitPicture {
   std::string file, caption;

@@ -62,9 +62,7 @@ Exhibit table_2_1(const RunContext& context) {
           "and is within 15 points of the printed one. Not confirmed: it falls, or is more than 25 off",
           kHeadColumns, kHeadRows, vertices, chain.mesh.mesh.triangles.size()),
       {table},
-      Verdict::kInPart};
-  if (rises && furthest <= 15) e.verdict = Verdict::kConfirmed;
-  if (!rises || furthest > 25) e.verdict = Verdict::kNotConfirmed;
+      verdict_of(rises && furthest <= 15, !rises || furthest > 25)};
   e.finding = fmt::format(
       "the share removed {} with the scale and is at most {:.1f} points from the printed one. A grid of "
       "36 x 52 over a full turn has exactly the printed numbers of vertices and faces. The head is "
@@ -120,9 +118,7 @@ Exhibit figure_2_2(const RunContext& context) {
       "Confirmed: the number rises at no step and comes down to 2. Not confirmed: it ends above 4, or rises at more than "
       "a tenth of the steps",
       {table},
-      rises == 0 && last <= 2          ? Verdict::kConfirmed
-      : last > 4 || 10 * rises > steps ? Verdict::kNotConfirmed
-                                       : Verdict::kInPart,
+      verdict_of(rises == 0 && last <= 2, last > 4 || 10 * rises > steps),
       fmt::format(
           "{} crossings become {}; {} of {} steps from scale to scale add some. The signal is another one, so the "
           "course can be compared, and not where a number is reached.",
@@ -159,10 +155,9 @@ Exhibit figure_6_2(const RunContext& context) {
       "360 samples need a larger sigma_max than 36; different models need different ones; the rate is not constant",
       "rings of made scans, 360 samples and every tenth of them, 40 scales, window 1.4 sigma",
       {table},
-      Verdict::kInPart,
+      verdict_of(fine > coarse && coarse > 0 && fine != other, false),
       "",
       {plot}};
-  if (fine > coarse && coarse > 0 && fine != other) e.verdict = Verdict::kConfirmed;
   e.finding = fmt::format(
       "counted in samples, the head's range is halved at sigma {:.1f} with 360 samples and at {:.1f} with "
       "36; the nutcracker's at {:.1f} with 360. As a length on the surface sigma hardly differs "
@@ -255,9 +250,7 @@ Exhibit table_7_1(const Nutcracker& n) {
           "fewer than two steps rise",
           kNutcrackerColumns, kNutcrackerRows, n.chain.mesh.mesh.triangles.size()),
       {table},
-      small < rows || rising < 2 ? Verdict::kNotConfirmed
-      : rising + 2 >= rows       ? Verdict::kConfirmed
-                                 : Verdict::kInPart,
+      verdict_of(small == rows && rising >= 2 && rising + 2 >= rows, small < rows || rising < 2),
       fmt::format(
           "ours rise in {} of {} steps, and {} of {} averages are below the JND of .10. Our first step takes {} of "
           "1,260 faces, the printed one 98: at the first sigma many samples of a coarse grid cross nothing. A grid "

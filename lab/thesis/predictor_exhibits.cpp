@@ -42,13 +42,10 @@ Exhibit figure_8_2(const PatternPlane& all, const PlanePredictors& p) {
       "first six orders, so that the last three decide. Confirmed: all orders hold. Not confirmed: none of these three "
       "does",
       {orders, table},
-      holds == std::size(kOrders) ? Verdict::kConfirmed
-      : unguided == 0             ? Verdict::kNotConfirmed
-                                  : Verdict::kInPart,
+      verdict_of(holds == std::size(kOrders), unguided == 0),
       fmt::format(
           "{} of {} orders hold, {} of them among the last three. The printed values stand in a picture that is not "
-          "available; the orders that the "
-          "text names are compared.",
+          "available; the orders that the text names are compared.",
           holds, std::size(kOrders), unguided),
       {},
       {{"fig-8-2.png", "the patterns, (a) to (f) in the first row", sheet.width_px, sheet.height_px,
@@ -79,8 +76,7 @@ Exhibit figure_8_3(const PatternPlane& all, const PlanePredictors& p) {
       "fig-8.3",
       "Fig. 8.3: where neighbours differ",
       "texels with a gradient count of one are shown in grey 200, the others in black",
-      "the patterns of Fig. 8.2, "
-      "threshold 24",
+      "the patterns of Fig. 8.2, threshold 24",
       {table},
       agree ? Verdict::kConfirmed : Verdict::kNotConfirmed,
       "the marked texels are those that zeta counts: between one and two pairs each.",
@@ -147,9 +143,7 @@ Exhibit figure_8_4(const LutTables& made) {
       "the patterns with the letters of Fig. 8.5, 64 x 64 px, at eleven qualities from 5 to 95; ln S over Q by least "
       "squares (8.7). Confirmed: ln S and Q correlate by .95 or more for all four. Not confirmed: (x) has less than .9",
       {models_table(made), sizes},
-      least >= 0.95  ? Verdict::kConfirmed
-      : first >= 0.9 ? Verdict::kInPart
-                     : Verdict::kNotConfirmed,
+      verdict_of(least >= 0.95, first < 0.9),
       fmt::format(
           "(x) correlates by {:.3f}, the least of the four by {:.3f}. Bytes of the model are up to {:.0f} % off, most "
           "at low qualities, where bytes grow faster than an exponential.",

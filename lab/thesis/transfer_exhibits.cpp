@@ -1,8 +1,8 @@
-// Tables 4.1 and 4.2, Figs. 4.3 to 4.7: Harmonic Time Compensation over links whose averages are
-// printed.
+// Tables 4.1 and 4.2, Figs. 4.3 to 4.7: Harmonic Time Compensation over links whose averages are printed.
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <numeric>
 
 #include "lab/study/allocation_study.h"
 #include "lab/study/fragment_study.h"
@@ -21,24 +21,10 @@ constexpr const char* kMadeTraces =
     "the traces are not available: made by code with the printed averages, a rate for each fragment, coefficient of "
     "variation .2";
 
-/// The thesis's own way: hard limits of quality; by the sign of the credit, or by throughput against beta_0.
-HtcOptions thesis_options(HtcOrder order) {
-  HtcOptions options = options_of({.order = order});
-  options.hard_limits = true;
-  options.window = 1;
-  return options;
-}
-
 // ---- Table 4.1, Fig. 4.3
 
 BandwidthTrace made_trace(double mean_kb_s, double cv, std::uint64_t seed) {
   return random_trace(mean_kb_s * 1e3, cv, 0, 1, kSamples, seed);
-}
-
-double mean_kb_s(const BandwidthTrace& trace) {
-  double sum = 0;
-  for (std::size_t k = 0; k < kSamples; ++k) sum += trace.bytes_s[k] / 1e3 / kSamples;
-  return sum;
 }
 
 Exhibit table_4_1() {
@@ -51,7 +37,7 @@ Exhibit table_4_1() {
   for (std::size_t k = 0; k < 3; ++k) {
     const BandwidthTrace trace = made_trace(kPrinted[k], 0.2, k + 1);
     const auto samples = std::span(trace.bytes_s).first(kSamples);
-    const double mean = mean_kb_s(trace);
+    const double mean = std::accumulate(samples.begin(), samples.end(), 0.0) / 1e3 / kSamples;
     table.rows.push_back({fmt::format("{}", k + 1), kPrinted[k], mean,
                           *std::ranges::min_element(samples) / 1e3,
                           *std::ranges::max_element(samples) / 1e3});
@@ -159,7 +145,7 @@ double most_of(const std::vector<Table42Row>& rows) {
 
 Runs42 runs_4_2() {
   const auto run = [](HtcOrder order, Table42Rungs rungs) {
-    return table_4_2(thesis_options(order), kSeeds, rungs);
+    return table_4_2(chapter_options(order), kSeeds, rungs);
   };
   return {run(HtcOrder::kCredit, Table42Rungs::kFine), run(HtcOrder::kCredit, Table42Rungs::kTen),
           run(HtcOrder::kBeta0, Table42Rungs::kFine), run(HtcOrder::kBeta0, Table42Rungs::kTen)};
@@ -176,25 +162,21 @@ Exhibit table_4_2_exhibit() {
           "qualities and at ten (10, 20 .. 100); ") +
           kMadeTraces,
       {table_of_surplus(runs), table_of_sizes(runs)},
-      Verdict::kInPart,
+      verdict_of(most_of(runs.printed) <= 1 && most_of(runs.credit) <= 1, most_of(runs.credit) > 1),
       "",
       {plot_4_4(runs)}};
   e.finding = fmt::format(
-      "with the order of the credit the mean of |Pi| is at most {:.2f} % in all twelve rows at 26 "
-      "qualities, where every fragment has a rate of its own. Over traces by time it is {:.1f}, {:.1f} and {:.2f} % "
-      "at 20, 23 and 26, {:.1f} % in the worst run. The printed order, rules (a) and (b), fails for {}: {:.1f}, "
-      "{:.1f} and {:.1f} % at "
-      "20, 23 and 26. There the fragments left to the end are at their best quality and cannot take "
-      "more time. Steps of 10 in quality are too coarse for a short list: up to {:.1f} % with the "
-      "order of the credit, {:.1f} % with the printed one. Lambda falls with beta_0 as printed; ours is "
-      "smaller, since the estimates hold the credits.",
+      "with the order of the credit the mean of |Pi| is at most {:.2f} % in all twelve rows at 26 qualities, where "
+      "every fragment has a rate of its own. Over traces by time it is {:.1f}, {:.1f} and {:.2f} % at 20, 23 and 26, "
+      "{:.1f} % in the worst run. The printed order, rules (a) and (b), fails for {}: {:.1f}, {:.1f} and {:.1f} % at "
+      "20, 23 and 26. There the fragments left to the end are at their best quality and cannot take more time. Steps "
+      "of 10 in quality are too coarse for a short list: up to {:.1f} % with the order of the credit, {:.1f} % with "
+      "the printed one. Lambda falls with beta_0 as printed; ours is smaller, since the estimates hold the credits.",
       most_of(runs.credit), runs.credit[0].trace_deviation_percent, runs.credit[1].trace_deviation_percent,
       runs.credit[2].trace_deviation_percent,
       std::ranges::max(runs.credit, {}, &Table42Row::trace_worst_percent).trace_worst_percent,
       rows_beyond(runs.printed), runs.printed[0].deviation_percent, runs.printed[1].deviation_percent,
       runs.printed[2].deviation_percent, most_of(runs.credit_ten), most_of(runs.printed_ten));
-  if (most_of(runs.printed) <= 1 && most_of(runs.credit) <= 1) e.verdict = Verdict::kConfirmed;
-  if (most_of(runs.credit) > 1) e.verdict = Verdict::kNotConfirmed;
   return e;
 }
 
@@ -241,7 +223,7 @@ Exhibit figure_4_5(const RunContext& context) {
       shown("as estimated", std::vector<std::int32_t>(offers.size(), static_cast<std::int32_t>(initial)), {});
   const BandwidthTrace trace = made_trace(41.68, 0.2, 1);
   const auto transferred = [&](double beta0_kb_s) {
-    HtcOptions options = thesis_options(HtcOrder::kCredit);
+    HtcOptions options = chapter_options(HtcOrder::kCredit);
     options.initial_bytes_s = beta0_kb_s * 1e3;
     options.time_limit_s = static_cast<double>(estimate.bytes) / options.initial_bytes_s;
     const SimulationResult r = simulate_samples(
@@ -263,9 +245,7 @@ Exhibit figure_4_5(const RunContext& context) {
           "moves by .01 at most. Not confirmed: it goes the other way, or the SSIM moves by more than .03; ") +
           kMadeTraces,
       {table},
-      directions && moved <= 0.01   ? Verdict::kConfirmed
-      : directions && moved <= 0.03 ? Verdict::kInPart
-                                    : Verdict::kNotConfirmed,
+      verdict_of(directions && moved <= 0.01, !directions || moved > 0.03),
       fmt::format(
           "the mean quality is {:.1f} with 32 and {:.1f} with 50, for the {} estimated. The mean SSIM is {:.4f} and "
           "{:.4f}, for {:.4f}.",
@@ -284,7 +264,7 @@ struct Network {
 double surplus_of(const Network& network, double share, std::uint64_t seed,
                   const std::vector<FragmentOffer>& offers) {
   const BandwidthTrace trace = made_trace(network.mean_kb_s, network.cv, seed);
-  HtcOptions options = thesis_options(HtcOrder::kCredit);
+  HtcOptions options = chapter_options(HtcOrder::kCredit);
   options.initial_bytes_s = share * network.mean_kb_s * 1e3;
   options.time_limit_s = kListBytes / options.initial_bytes_s;
   return simulate_samples(offers, options,
@@ -319,9 +299,7 @@ Exhibit networks(const std::string& id, const std::string& title, const std::str
           claim,
           std::string("Algorithm 4.1 with the order of the credit, 26 qualities, limits kept; ") + note,
           {table},
-          beyond == 0                                      ? Verdict::kConfirmed
-          : 4 * beyond <= list.size() * std::size(kShares) ? Verdict::kInPart
-                                                           : Verdict::kNotConfirmed,
+          verdict_of(beyond == 0, 4 * beyond > list.size() * std::size(kShares)),
           fmt::format("{} of {} runs are 1 % of the limit off or more, the worst {:.2f} %.", beyond,
                       list.size() * std::size(kShares), most),
           {plot}};

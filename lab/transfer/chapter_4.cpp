@@ -17,23 +17,36 @@ constexpr int kFineRungs[] = {5,  10, 15, 20, 25, 30, 35, 40, 45, 50, 55, 60, 65
                               70, 75, 80, 85, 90, 92, 94, 95, 96, 97, 98, 99, 100};
 constexpr int kLowestQuality = 40;
 
-std::span<const int> qualities_of(Table42Rungs rungs) {
-  if (rungs == Table42Rungs::kTen) return kTenRungs;
-  return kFineRungs;
-}
-
 /// IJG's scale of the quantisers, 1 at quality 50.
 double quantiser_scale(double quality) {
   return quality < 50 ? 50 / quality : std::max(2 - quality / 50, 0.015);
 }
 /// Bytes of a photograph grow about like this, 1 at quality 50.
 double relative_bytes(double quality) { return portable::pow(quantiser_scale(quality), -0.75); }
+
+HtcOptions serial(HtcOptions options) {
+  options.window = 1;
+  options.rtt_s = 0;
+  return options;
+}
+
+/// Plays the plan to its end, s.
+double play_samples(HarmonicTimePlan& plan, const std::function<double(std::size_t, double)>& rate) {
+  double now_s = 0;
+  while (const HtcStep* step = plan.next(now_s)) {
+    now_s += step->bytes / rate(step->position, now_s);
+    plan.completed(step->offer, now_s);
+  }
+  return now_s;
+}
+
 double relative_loss(double quality) { return 0.03 * portable::pow(quantiser_scale(quality), 0.8); }
 
 }  // namespace
 
 std::vector<FragmentOffer> table_4_2_offers(Table42Rungs rungs) {
-  const std::span<const int> qualities = qualities_of(rungs);
+  const std::span<const int> qualities =
+      rungs == Table42Rungs::kTen ? std::span<const int>(kTenRungs) : kFineRungs;
   TraceRandom random(42);
   std::vector<FragmentOffer> offers(kFragments);
   std::vector<double> base(kFragments);
@@ -104,27 +117,17 @@ std::vector<Table42Row> table_4_2(const HtcOptions& base, int seeds, Table42Rung
 
 SimulationResult simulate_samples(std::vector<FragmentOffer> offers, const HtcOptions& options,
                                   const std::function<double(std::size_t, double)>& rate) {
-  HtcOptions serial = options;
-  serial.window = 1;
-  serial.rtt_s = 0;
-  HarmonicTimePlan plan(std::move(offers), serial);
-  double now_s = 0;
-  while (const HtcStep* step = plan.next(now_s)) {
-    now_s += step->bytes / rate(step->position, now_s);
-    plan.completed(step->offer, now_s);
-  }
-  return result_of(plan, options.time_limit_s, now_s);
+  HarmonicTimePlan plan(std::move(offers), serial(options));
+  const double end_s = play_samples(plan, rate);
+  return result_of(plan, options.time_limit_s, end_s);
 }
 
 SimulationResult simulate_serial_trace(std::vector<FragmentOffer> offers, const HtcOptions& options,
                                        const BandwidthTrace& trace) {
-  HtcOptions serial = options;
-  serial.window = 1;
-  serial.rtt_s = 0;
   NetworkOptions network;
   network.link = trace;
   network.connections = 1;
-  return simulate(std::move(offers), serial, network);
+  return simulate(std::move(offers), serial(options), network);
 }
 
 double TraceRandom::uniform() { return numbers_.next() + 1 / 9007199254740992.0; }
@@ -182,11 +185,7 @@ HtcTheorem theorem_run(const HtcOptions& base, const std::vector<FragmentOffer>&
   HarmonicTimePlan plan(offers, o);
   const BandwidthTrace samples =
       random_trace(41.68e3, 0.05 * (seed % 20), 0.5, 1, 300, static_cast<std::uint64_t>(seed));
-  double now = 0;
-  while (const HtcStep* s = plan.next(now)) {
-    now += s->bytes / samples.bytes_s[s->position];
-    plan.completed(s->offer, now);
-  }
+  play_samples(plan, [&](std::size_t k, double) { return samples.bytes_s[k]; });
   return theorem_of(plan);
 }
 

@@ -148,4 +148,10 @@ HtcOptions options_of(const LabOptions& choice) {
   return options;
 }
 
+HtcOptions chapter_options(HtcOrder order) {
+  HtcOptions options = options_of({.order = order});
+  options.hard_limits = true, options.window = 1;
+  return options;
+}
+
 }  // namespace texmesh

@@ -47,5 +47,7 @@ double estimate_bytes_s(const LabOptions& options, const Throughput& all, const 
 void use_policy(const LabOptions& choice, HtcOptions& options);
 /// The other options at their defaults.
 HtcOptions options_of(const LabOptions& choice);
+/// As in chapter 4: with limits of quality, one request at a time.
+HtcOptions chapter_options(HtcOrder order);
 
 }  // namespace texmesh

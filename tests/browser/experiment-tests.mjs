@@ -142,6 +142,43 @@ test('experiment: simulated judges get their thresholds back', async () => {
   await page.close();
 }, {seconds: 300});
 
+test('experiment: a judge moves an object until both look alike', async () => {
+  const e = experiment('move', '--move', '--stimuli', 'quadrics', '--sizes', '120', '--views', '3', '--objects', '1', '--repeats', '1', '--catches', '2',
+    '--levels', '.05,.1,.2', '--pause', '0');
+  const frames = e.design.conditions.map((c) => c.frame_px);
+  for (const [context, cssPxPerMm] of [[kDesktop, 96 / 25.4], [kPhone, 6.2]]) {
+    const at = await opened(e, {context, judge: 'mover'});
+    const {page} = at;
+    check(/Move the right one/.test(await page.innerText('#welcome')) && !/on top/.test(await page.innerText('#welcome')), 'another task is explained');
+    await begin(at, cssPxPerMm);
+    for (let k = 1; k <= e.design.orders[0].length; ++k) {
+      await shown(page, k);
+      await page.waitForTimeout(160);
+      const [reference, , moved] = await names(page);
+      const trial = e.design.trials.find((t) => t.moved.includes(moved));
+      const began = trial.moved.indexOf(moved);
+      check(trial.reference === reference && (began === 0 || began === frames.length - 1), `it begins at place ${began}`);
+      for (let place = began; place !== 4;) {
+        await page.keyboard.press(place < 4 ? 'ArrowRight' : 'ArrowLeft');
+        place += place < 4 ? 1 : -1;
+      }
+      check((await names(page))[2] === trial.moved[4], 'the keys do not move it');
+      const [box, image] = await page.evaluate(() => ['#right', '#right img'].map((s) => document.querySelector(s).getBoundingClientRect().toJSON()));
+      near(image.height / box.height, frames[4] / frames[0], 0.001, 'size at the fifth place');
+      near(image.y + image.height / 2, box.y + box.height / 2, 2, 'middle of the picture');
+      if (k === 1) await page.screenshot({path: path.join(pictures, `experiment-move-${context === kPhone ? 'phone' : 'desktop'}.png`)});
+      if (k % 2) await page.keyboard.press('Enter');
+      else await page.click('#alike');
+    }
+    await page.waitForSelector('#done:not([hidden])');
+    const kept = await page.evaluate(() => JSON.parse(Object.values(localStorage)[0]));
+    check(kept.places_px.length === frames.length && kept.answers.every((a) => a.place === 4 && !('side' in a)), JSON.stringify(kept.answers));
+    check(new Set(kept.answers.map((a) => a.began)).size === 2, 'all objects begin at one place');
+    check(page.said.length === 0, page.said.join('\n'));
+    await at.close();
+  }
+}, {seconds: 120});
+
 test('experiment: pictures tell nothing by their names or sizes', async () => {
   const e = experiment('names', '--stimuli', 'ellipsoids', '--sizes', '40', '--views', '3', '--repeats', '4');
   const files = fs.readdirSync(path.join(e.folder, 'stimuli'));

@@ -7,8 +7,9 @@ const kNearestMm = 200;
 const distanceFor = (mm, pixelsPerDegree) => (mm * pixelsPerDegree) / (2 * Math.tan(Math.PI / 360));
 
 /** Room in CSS px that the largest trial needs, stacked or in one row, without and with the controls. */
-function roomFor(framePx, zoom, dpr) {
+function roomFor(framePx, zoom, dpr, move) {
   const side = (framePx * zoom) / dpr;
+  if (move) return {move: {width: 2 * side + 24, height: side + 190}};
   return {stacked: {width: 2 * side + 24, height: 2 * side + 150}, row: {width: 3 * side + 32, height: side + 140}};
 }
 
@@ -18,20 +19,21 @@ function roomFor(framePx, zoom, dpr) {
  */
 export function arrange(design, cssPxPerMm, view) {
   const framePx = Math.max(...design.conditions.map((c) => c.frame_px));
+  const move = Boolean(design.trials[0].moved);
   const devicePxPerMm = cssPxPerMm * view.dpr;
   const distanceAt = (zoom) => distanceFor(zoom / devicePxPerMm, design.pixels_per_degree);
   let wanted = 1;
   while (distanceAt(wanted) < kNearMm) ++wanted;
   for (const zoom of [wanted, wanted - 1]) {
     if (zoom < 1 || distanceAt(zoom) < kNearestMm) continue;
-    const room = roomFor(framePx, zoom, view.dpr);
-    for (const layout of ['stacked', 'row'])
+    const room = roomFor(framePx, zoom, view.dpr, move);
+    for (const layout of Object.keys(room))
       if (room[layout].width <= view.width && room[layout].height <= view.height)
         return {zoom, distanceMm: distanceAt(zoom), layout};
   }
-  const {stacked, row} = roomFor(framePx, wanted, view.dpr);
+  const rooms = Object.values(roomFor(framePx, wanted, view.dpr, move));
   const size = (r) => `${Math.ceil(r.width)} x ${Math.ceil(r.height)}`;
-  return {misfit: `The pictures need ${size(stacked)} or ${size(row)} pixels, this window has ${view.width} x ${view.height}. Enlarge the window, turn the phone, or take a larger screen.`};
+  return {misfit: `The pictures need ${rooms.map(size).join(' or ')} pixels, this window has ${view.width} x ${view.height}. Enlarge the window, turn the phone, or take a larger screen.`};
 }
 
 export const viewNow = () => ({width: window.innerWidth, height: window.innerHeight, dpr: window.devicePixelRatio || 1});

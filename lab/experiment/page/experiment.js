@@ -1,6 +1,7 @@
 // The course of an experiment: consent, the screen's measure, trials, results. design.json beside this file says all of it.
 import {arrange, measureDisplay, viewNow} from './display.js';
 import {keepResults, keptResults, newResults, offerResults} from './results.js';
+import {askMove} from './move.js';
 import {askTrial, makeTable} from './trial.js';
 
 const $ = (id) => document.getElementById(id);
@@ -8,7 +9,7 @@ const $ = (id) => document.getElementById(id);
 function show(name) {
   for (const section of document.querySelectorAll('main > section')) section.hidden = section.id !== name;
   document.body.classList.toggle('judging', name === 'trial');
-  $(name).querySelector('h1').focus();
+  [...$(name).querySelectorAll('h1')].find((h) => h.offsetParent)?.focus();
   window.scrollTo(0, 0);
 }
 
@@ -26,12 +27,15 @@ function showText(element, text) {
   }
 }
 
+/** Whether judges move an object, in place of choosing one (6.2). */
+const movesOf = (design) => Boolean(design.trials[0].moved);
+
 const newName = () => `j-${[...crypto.getRandomValues(new Uint8Array(6))].map((n) => (n % 36).toString(36)).join('')}`;
 
 /** Consent and name; resolves with {judge, kept}: kept are answers to go on with, or null. */
 function welcome(design) {
   const trials = design.orders[0].length;
-  $('length').textContent = `${trials} choices, about ${Math.max(2, Math.round((trials * 5) / 60))} minutes.`;
+  $('length').textContent = `${trials} choices, about ${Math.max(2, Math.round((trials * (movesOf(design) ? 15 : 5)) / 60))} minutes.`;
   showText($('consent'), design.consent);
   const kept = keptResults(design);
   const open = kept && kept.answers.length > 0 && kept.answers.length < trials;
@@ -57,7 +61,7 @@ async function judge(design, results, display) {
   for (let k = results.answers.length; k < order.length; ++k) {
     $('count').textContent = `${k + 1} of ${order.length}`;
     $('done-so-far').value = k / order.length;
-    results.answers.push(await askTrial(design, table, order[k], $));
+    results.answers.push(await (movesOf(design) ? askMove : askTrial)(design, table, order[k], $));
     keepResults(design, results);
   }
   window.removeEventListener('resize', watch);
@@ -69,6 +73,7 @@ async function main() {
   const design = await answer.json();
   if (design.version !== 1) throw new Error(`design.json is of version ${design.version}, this page of version 1`);
   document.documentElement.style.setProperty('--stimulus', design.background);
+  document.body.classList.toggle('moving', movesOf(design));
   const {judge: name, kept} = await welcome(design);
   show('display');
   const display = await measureDisplay(design, $);

@@ -39,7 +39,8 @@ export function newResults(design, judge, display) {
       pixels_per_degree: design.pixels_per_degree, distance_mm: round(display.distanceMm, 0), layout: display.layout,
       width_px: display.view.width, height_px: display.view.height, touch: matchMedia('(pointer: coarse)').matches,
     },
-    trials: design.orders[0].length, answers: [],
+    trials: design.orders[0].length,
+    ...(design.trials[0].moved && {places_px: design.conditions.map((c) => c.displayed_px)}), answers: [],
   };
 }
 

@@ -1,11 +1,11 @@
 // One trial: three pictures that turn together, a time limit, one choice.
-const kTurnMs = 900; // a view, while the pictures turn by themselves
-const kBlindMs = 150; // a choice so early was meant for the trial before
+export const kTurnMs = 900; // a view, while the pictures turn by themselves
+export const kBlindMs = 150; // a choice so early was meant for the trial before
 
-const wait = (ms) => new Promise((done) => setTimeout(done, ms));
+export const wait = (ms) => new Promise((done) => setTimeout(done, ms));
 
 /** A picture that is there before it is shown. */
-async function loadPicture(name) {
+export async function loadPicture(name) {
   const picture = new Image();
   picture.src = `stimuli/${name}`;
   await picture.decode();
@@ -18,27 +18,30 @@ export function makeTable(design, scale, layout, $) {
   const images = boxes.map((box) => box.querySelector('img'));
   const turn = $('turn');
   turn.max = design.views - 1;
-  $('table').classList.toggle('row', layout === 'row');
+  $('table').classList.add(layout);
   for (const where of document.querySelectorAll('#trial .where')) where.textContent = layout === 'row' ? 'one in the middle' : 'one on top';
-  let side = 0;
+  let sides = [0, 0, 0], margins = [0, 0, 0];
   const showView = (view) => {
     const wrapped = (view + design.views) % design.views;
     turn.value = wrapped;
-    for (const image of images) image.style.left = `${-wrapped * side}px`;
+    images.forEach((image, k) => {
+      image.style.left = `${margins[k] - wrapped * sides[k]}px`;
+      image.style.clipPath = `inset(0 ${(design.views - 1 - wrapped) * sides[k]}px 0 ${wrapped * sides[k]}px)`;
+    });
   };
   return {
     turn, boxes, showView,
     view: () => Number(turn.value),
     blank: (on) => $('table').classList.toggle('blank', on),
-    place(framePx, sources) {
-      side = framePx * scale;
-      boxes.forEach((box, k) => {
-        box.style.width = box.style.height = `${side}px`;
-        images[k].src = sources[k];
-        images[k].style.height = `${side}px`;
-        images[k].style.width = `${side * design.views}px`;
-      });
-      showView(0);
+    /** Puts picture `k`, whose views have a side of `px`, into the middle of a box with a side of `framePx`. */
+    put(k, source, px, framePx) {
+      sides[k] = px * scale;
+      margins[k] = Math.floor((framePx - px) / 2) * scale;
+      boxes[k].style.width = boxes[k].style.height = `${framePx * scale}px`;
+      images[k].src = source;
+      images[k].style.top = `${margins[k]}px`;
+      images[k].style.height = `${sides[k]}px`;
+      images[k].style.width = `${sides[k] * design.views}px`;
     },
   };
 }
@@ -94,7 +97,8 @@ export async function askTrial(design, table, code, $) {
   table.turn.disabled = false;
   const [sources] = await Promise.all([Promise.all(names.map(loadPicture)), wait(1000 * design.pause_s)]);
   const condition = design.conditions[trial.condition];
-  table.place(condition.frame_px, sources);
+  sources.forEach((source, k) => table.put(k, source, condition.frame_px, condition.frame_px));
+  table.showView(0);
   await Promise.all(table.boxes.map((box) => box.querySelector('img').decode()));
   table.blank(false);
   const {chosen, ms, late} = await choiceOf(design, table, $);

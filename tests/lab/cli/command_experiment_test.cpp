@@ -55,6 +55,25 @@ TEST_F(ExperimentCommand, MakesAFolderThatItsSchemaDescribes) {
             1);  // never replaced
 }
 
+TEST_F(ExperimentCommand, JudgesMoveUntilAlike) {
+  ASSERT_EQ(experiment({"make", "--move", "--stimuli", "quadrics", "--sizes", "64", "--views", "1",
+                        "--objects", "1", "--repeats", "1", "-o", folder_ / "e"})
+                .exit_code,
+            0);
+  EXPECT_TRUE(follows_schema(Json::parse(read_text(folder_ / "e/design.json")), "experiment-design.v1"));
+  EXPECT_TRUE(std::filesystem::exists(folder_ / "e/move.js"));
+  SimulatedJudge judge;
+  judge.exponent = 1;
+  const std::vector<std::string> files = judges(simulated_moves(320, 8), judge, 3);
+  EXPECT_TRUE(follows_schema(Json::parse(read_text(files[0])), "experiment-results.v1"));
+  const CommandResult r = fit(files, {"--json", "-o", folder_ / "p.json"});
+  ASSERT_EQ(r.exit_code, 0) << r.errors << r.output;
+  const Json document = Json::parse(r.output);
+  EXPECT_TRUE(follows_schema(document, "experiment-fit.v1"));
+  EXPECT_EQ(document["matches"].size(), 7u);
+  EXPECT_TRUE(follows_schema(Json::parse(read_text(folder_ / "p.json")), "jnd-profile.v1"));
+}
+
 TEST_F(ExperimentCommand, UsageErrorsNameTheOption) {
   const auto said = [&](std::vector<std::string> arguments) {
     arguments.insert(arguments.begin(), "make");
@@ -73,6 +92,7 @@ TEST_F(ExperimentCommand, UsageErrorsNameTheOption) {
   EXPECT_NE(said({q, "--levels", "0.1,0.2"}).find("3 to 20 numbers"), std::string::npos);
   EXPECT_NE(said({q, "--levels", "0.1,0.2,0.9"}).find("--levels"), std::string::npos);
   EXPECT_NE(said({q, "--sizes", "3"}).find("--sizes"), std::string::npos);
+  EXPECT_NE(said({q, "--move", "--sizes", "64,128"}).find("one size with --move"), std::string::npos);
   EXPECT_NE(said({q, "--sizes", "2000", "--views", "20"}).find("--views"), std::string::npos);
   EXPECT_NE(said({q, "--post", "javascript:alert(1)"}).find("--post"), std::string::npos);
   EXPECT_NE(said({q, "--post", "https://a.b/ 'unsafe-inline'"}).find("--post"), std::string::npos);

@@ -40,6 +40,28 @@ TEST(Design, EveryOrderAsksEveryTrialOnce) {
   EXPECT_EQ(std::set<std::vector<std::uint32_t>>(d.orders.begin(), d.orders.end()).size(), d.orders.size());
 }
 
+TEST(Design, AMoveIsAskedOnceForAllItsPlaces) {
+  ExperimentDesign d;
+  d.options.move = true, d.options.repeats = 4, d.options.catches = 4, d.options.objects = 2;
+  d.options.title = "t", d.options.consent = "c";
+  d.background = "#7c7c7c";
+  d.conditions = {{128, 180}, {64, 90}, {32, 45}};
+  d.levels = {0.05, 0.1, 0.2};
+  plan_trials(d);
+  ASSERT_EQ(d.trials.size(), 4u * 4);
+  std::set<std::string> names;
+  for (const ExperimentTrial& t : d.trials) {
+    EXPECT_EQ(t.condition, 0u);
+    EXPECT_EQ(t.level == 0, t.is_catch);
+    ASSERT_EQ(t.moved.size(), 3u);
+    names.insert(t.moved.begin(), t.moved.end());
+  }
+  EXPECT_EQ(names.size(), 2u * 4 * 3);  // objects, levels and the unchanged one, places
+  const DesignKey key = read_design(bytes_of(write_design(d)), "design.json");
+  EXPECT_EQ(key.places_px, (std::vector<double>{128, 64, 32}));
+  EXPECT_EQ(key.trials.size(), 16u);
+}
+
 TEST(Design, SidesAreBalancedWithinEveryLevelAndSize) {
   for (const int repeats : {6, 5, 1}) {
     const ExperimentDesign d = planned(3, repeats, 4);

@@ -78,6 +78,54 @@ TEST(FitExperiment, DistanceDecidesTheProfilesExponent) {
   EXPECT_NEAR(half.jnd.value, 0.09, 0.006);
 }
 
+TEST(FitExperiment, MovesTellWhereEachChangeLooksAlikeAndTheSameThreshold) {
+  const ExperimentDesign design = testing::simulated_moves(320, 8);
+  SimulatedJudge judge;
+  judge.exponent = 1, judge.threshold = 0.1;
+  for (const std::size_t count : {3, 8}) {  // few: answers are drawn, else judges
+    const ExperimentFit fit = fitted(group(design, judge, count));
+    EXPECT_EQ(fit.kept(), count);
+    EXPECT_EQ(fit.answers, count * 7 * 8);
+    ASSERT_EQ(fit.matches.size(), 7u);
+    for (const auto& [level, px] : fit.matches) {
+      const double wanted = std::clamp(128 * 0.1 / level.level, 320 * std::pow(0.87, 20), 320.0);
+      EXPECT_NEAR(px.value / wanted, 0.95, 0.1) << level.level;  // places are 13 % apart
+      EXPECT_EQ(level.answers, count * 8);
+    }
+    EXPECT_TRUE(fit.found) << fit.verdict;
+    EXPECT_NEAR(fit.distance_exponent, 1, 0.12) << fit.distance_verdict;
+    EXPECT_NEAR(fit.jnd.value / (12.8 / fit.reference_px), 1, 0.12);
+    EXPECT_NE(fit_text(fit).find("looks like the unchanged one"), std::string::npos);
+    EXPECT_NE(fit_page(fit).find("Where both look alike"), std::string::npos);
+    EXPECT_NE(jnd_profile_json(fit).find("moved until alike"), std::string::npos);
+  }
+}
+
+TEST(FitExperiment, JudgesWhoDoNotMoveOrDoNotLookAreLeftOut) {
+  const ExperimentDesign design = testing::simulated_moves(320, 8);
+  SimulatedJudge good, still, guesses;
+  good.exponent = 1;
+  still.habit = Habit::kLeftKey, guesses.habit = Habit::kGuesses;
+  std::vector<ExperimentResults> results = group(design, good, 4);
+  results.push_back(simulated_results(design, still, 10));
+  results.push_back(simulated_results(design, guesses, 12));
+  const ExperimentFit fit = fitted(results);
+  EXPECT_EQ(fit.kept(), 4u);
+  EXPECT_EQ(fit.judges[4].verdict, JudgeVerdict::kOneSide);
+  EXPECT_EQ(fit.judges[5].verdict, JudgeVerdict::kInattentive);
+  results[1].places_px[2] += 1;
+  EXPECT_NE(refused(results).find("/places_px"), std::string::npos);
+}
+
+TEST(FitExperiment, ChangesThatAllLookAlikeFromOneSizeOnHaveNoThreshold) {
+  SimulatedJudge judge;  // the same at every distance: seen everywhere, or nowhere
+  const ExperimentFit fit = fitted(group(testing::simulated_moves(320, 8, 0.99), judge, 6));
+  EXPECT_EQ(fit.matches.front().second.value, 320);
+  EXPECT_NEAR(fit.distance_exponent, 0, 0.05);
+  judge.threshold = 0.5;
+  EXPECT_FALSE(fitted(group(testing::simulated_moves(320, 8), judge, 6)).found);
+}
+
 TEST(FitExperiment, BadJudgesAreLeftOutWithNumbers) {
   const ExperimentDesign design = simulated_design({128}, 12);
   std::vector<ExperimentResults> results = group(design, {}, 4);

@@ -56,6 +56,22 @@ TEST(MakeExperiment, PicturesShowWhatTheTrialsSay) {
   }
 }
 
+TEST(MakeExperiment, AMovedObjectShrinksFromPlaceToPlace) {
+  ExperimentOptions o = small_options();
+  o.move = true, o.sizes_px = {64}, o.objects = 1, o.views = 1;
+  const Experiment e = made(o);
+  ASSERT_EQ(e.design.conditions.size(), kPlaces);
+  EXPECT_EQ(e.design.conditions[kPlacesAnOctave].displayed_px, 32);
+  EXPECT_EQ(e.design.conditions.back().displayed_px, 4);
+  for (const ExperimentTrial& t : e.design.trials) {
+    const Pixels reference = picture(e, t.reference);
+    ASSERT_EQ(t.moved.size(), kPlaces);
+    for (std::size_t place = 0; place < kPlaces; place += kPlacesAnOctave)
+      EXPECT_EQ(picture(e, t.moved[place]).height_px, e.design.conditions[place].frame_px);
+    EXPECT_EQ(picture(e, t.moved[0]).data == reference.data, t.is_catch);
+  }
+}
+
 TEST(MakeExperiment, FilesTellNothingByTheirLength) {
   const Experiment e = made(small_options());
   std::vector<std::size_t> lengths;

@@ -44,6 +44,23 @@ TEST(Results, AreReadAsTheyWereGiven) {
   EXPECT_EQ(read.answers, given.answers);
 }
 
+TEST(Results, OfMovesHoldPlaces) {
+  const ExperimentResults given = testing::simulated_results(testing::simulated_moves(320, 1), {}, 1);
+  json document = json::parse(testing::results_json(given));
+  const auto read = [&document] {
+    const std::string text = document.dump();
+    return read_results({reinterpret_cast<const std::uint8_t*>(text.data()), text.size()}, "r.json");
+  };
+  EXPECT_EQ(read().places_px, given.places_px);
+  EXPECT_EQ(read().answers, given.answers);
+  document["places_px"][1] = 321;
+  EXPECT_EQ(refused(document.dump()), "/places_px/1");  // larger than the nearest
+  document["places_px"] = {320, 160};
+  EXPECT_EQ(refused(document.dump()).rfind("/answers/", 0), 0u);  // a place that is not there
+  document.erase("places_px");
+  EXPECT_EQ(refused(document.dump()), "/answers/0");
+}
+
 TEST(Results, NumbersOutOfRangeAreRefusedWhereTheyStand) {
   for (const auto& [pointer, value] :
        std::vector<std::pair<std::string, json>>{{"/version", 2},
