@@ -24,11 +24,11 @@ function placeOf(design, table, begins, show, $) {
     listen(slider, 'input', () => move(0));
     listen(table.turn, 'input', () => { own = true; table.showView(table.view()); });
     listen(document, 'keydown', (e) => {
-      if (e.altKey || e.ctrlKey || e.metaKey || e.target === table.turn || e.target === $('alike')) return;
+      if (e.altKey || e.ctrlKey || e.metaKey || e.target === table.turn) return;
       const step = {ArrowUp: 1, ArrowDown: -1}[e.key];
       if (e.key === 'ArrowLeft' || e.key === 'ArrowRight') move(e.key === 'ArrowLeft' ? -1 : 1);
       else if (step) { own = true; table.showView(table.view() + step); }
-      else if (e.key === 'Enter' && !e.repeat) choose();
+      else if (e.key === 'Enter' && !e.repeat && e.target !== $('alike')) choose(); // the button clicks by itself
       else return;
       e.preventDefault();
     });
