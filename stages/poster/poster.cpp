@@ -1,6 +1,7 @@
 #include "stages/poster/poster.h"
 
 #include "format/base/portable_math.h"
+#include "format/rules/first_look.h"
 #include "stages/jpeg/jpeg.h"
 #include "stages/poster/poster_camera.h"
 #include "stages/render/shade.h"
@@ -57,9 +58,8 @@ constexpr double kStrays = 0.005;  // share of positions that may be strays, on 
 struct Direction {
   double azimuth_degrees, elevation_degrees, weight;
 };
-// First the one that viewers begin with (delivery/web/src/page/framing.ts); the others must show much more to
-// be taken.
-constexpr std::array<Direction, 8> kDirections{{{28, 18, 1},
+// First the one that viewers begin with; the others must show much more to be taken.
+constexpr std::array<Direction, 8> kDirections{{{kFirstLookAzimuthDegrees, kFirstLookElevationDegrees, 1},
                                                 {-28, 18, 0.9},
                                                 {30, 40, 0.7},
                                                 {-30, 40, 0.7},
@@ -177,15 +177,27 @@ RenderCamera fitted_camera(const std::vector<Vec3d>& positions, Vec3d x, Vec3d y
   return camera;
 }
 
+RenderCamera first_look(const std::vector<Vec3d>& positions, Vec3d direction) {
+  Box3d box;
+  for (const Vec3d p : positions)
+    if (std::isfinite(p.x) && std::isfinite(p.y) && std::isfinite(p.z)) box.extend(p);
+  if (box.empty()) box.extend(Vec3d{});
+  const double radius = std::max(box.diagonal() / 2, 1e-9);
+  const double distance = radius / portable::sin(radians(kFirstLookFovDegrees) / 2);
+  return look_at_camera(box.centre() + direction * distance, box.centre(), {0, 1, 0}, kFirstLookFovDegrees,
+                        distance / 500);
+}
+
 RenderCamera poster_camera(const RenderScene& scene, const RenderScene& coarse, const RunContext& context) {
   const std::vector<Vec3d> positions = positions_of(scene);
   RenderCamera best;
-  for (const double left_out : {0.0, kStrays}) {
+  for (const bool strays : {false, true}) {
     double most = -1;
     for (const Direction& direction : kDirections) {
       context.check_cancelled();
       const Frame f = frame_of(direction);
-      const RenderCamera camera = fitted_camera(positions, f.x, f.y, f.z, left_out);
+      const RenderCamera camera =
+          strays ? fitted_camera(positions, f.x, f.y, f.z, kStrays) : first_look(positions, f.z);
       const double score = static_cast<double>(covered_pixels(coarse, camera, context)) * direction.weight;
       if (score > most) most = score, best = camera;
     }

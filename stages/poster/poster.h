@@ -8,7 +8,7 @@
 
 namespace texmesh {
 
-inline constexpr int kPosterVersion = 4;
+inline constexpr int kPosterVersion = 5;
 
 struct PosterOptions {
   int size_px = 512;
@@ -25,8 +25,9 @@ struct PosterOptions {
 /// - View: the direction that viewers begin with, or one that shows much more of the object's area.
 /// Directions
 ///   near the front, a little from above, count more than those from high above, from behind and from below.
-/// - Frame: a square. The object touches a margin of 4 % on two opposite sides at least. Where strays make
-///   the object tiny, the picture shows the place in which nearly all positions lie.
+/// - Frame: a square, in which the object has the size and place that it has in viewers
+/// (kFirstLookFovDegrees).
+///   Where strays make the object tiny, the picture shows the place in which nearly all positions lie.
 /// - File: 4:2:0, the highest quality (IJG) that fits `max_bytes`. Where not even quality 1 fits, the sides
 ///   are halved.
 /// An object of which nothing is seen gives a picture of the background. `pixels` are fill_planes()'s.

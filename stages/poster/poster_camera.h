@@ -10,7 +10,10 @@ namespace texmesh {
 /// Positions that are not finite do not count; where none is left the camera looks at the origin.
 RenderCamera fitted_camera(const std::vector<Vec3d>& positions, Vec3d x, Vec3d y, Vec3d z, double left_out);
 
-/// The fitted camera of the direction that shows most, see make_poster(). `coarse` is the same object with
+/// The camera that viewers begin with, at `direction` from the positions (kFirstLookFovDegrees says how).
+RenderCamera first_look(const std::vector<Vec3d>& positions, Vec3d direction);
+
+/// The camera of the direction that shows most, see make_poster(). `coarse` is the same object with
 /// few triangles, by which directions are compared.
 RenderCamera poster_camera(const RenderScene& scene, const RenderScene& coarse, const RunContext& context);
 

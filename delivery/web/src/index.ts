@@ -5,5 +5,7 @@
 export * from './decisions';
 export { TexmeshPackage, open } from './open';
 export { daylight, isMetallic } from './page/daylight';
+export { frame } from './page/framing';
+export { firstLookFovDegrees } from './format/shared_numbers';
 export { reflectSky } from './page/sky';
 export type * from './scene/api';

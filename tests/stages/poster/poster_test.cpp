@@ -3,8 +3,11 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
+#include <numbers>
 
+#include "format/rules/first_look.h"
 #include "stages/base/run_context.h"
 #include "stages/jpeg/jpeg.h"
 #include "stages/poster/poster_camera.h"
@@ -101,19 +104,17 @@ TEST(Poster, SidesAreHalvedWhereNoQualityFits) {
   EXPECT_EQ(picture_of(poster).width_px, poster.width_px);
 }
 
-TEST(Poster, FillsTheFrame) {
-  for (const Mesh& mesh : {testing::sphere(20, 40), testing::cube(), testing::sheet(8)}) {
-    const Pixels p = picture_of(poster_of(mesh));
-    std::uint32_t left = p.width_px, right = 0, top = p.height_px, bottom = 0;
-    for (std::uint32_t y = 0; y < p.height_px; ++y)
-      for (std::uint32_t x = 0; x < p.width_px; ++x)
-        if (std::abs(*p.at(x, y) - *p.at(0, 0)) > 12) {
-          left = std::min(left, x), right = std::max(right, x + 1);
-          top = std::min(top, y), bottom = std::max(bottom, y + 1);
-        }
-    EXPECT_GT(std::max(right - left, bottom - top), p.width_px * 85 / 100);
-    EXPECT_LT(std::max(right - left, bottom - top), p.width_px * 95 / 100);
-  }
+TEST(Poster, ShowsTheObjectAsLargeAsViewersDo) {
+  const Pixels p = picture_of(poster_of(testing::sphere(20, 40)));
+  std::uint32_t left = p.width_px, right = 0;
+  for (std::uint32_t y = 0; y < p.height_px; ++y)
+    for (std::uint32_t x = 0; x < p.width_px; ++x)
+      if (std::abs(*p.at(x, y) - *p.at(0, 0)) > 12) left = std::min(left, x), right = std::max(right, x + 1);
+  // The sphere round the box of a sphere is sqrt(3) times as large.
+  const double sine = std::sin(kFirstLookFovDegrees / 2 * std::numbers::pi / 180) / std::sqrt(3.0);
+  const double share =
+      std::tan(std::asin(sine)) / std::tan(kFirstLookFovDegrees / 2 * std::numbers::pi / 180);
+  EXPECT_NEAR(right - left, share * p.width_px, 0.02 * p.width_px);
 }
 
 TEST(Poster, ShowsTexturesInTheirColours) {
@@ -188,6 +189,19 @@ TEST(Poster, PixelsMustFitThePlanes) {
   EXPECT_THROW(poster_of(testing::cube(), textured(), small), StageError);
   small.pixels.clear();
   EXPECT_THROW(poster_of(testing::cube(), textured(), small), StageError);
+}
+
+// delivery/web/tests/page/framing.test.ts has the same numbers for viewers.
+TEST(PosterCamera, IsTheOneThatViewersBeginWith) {
+  constexpr double kDegree = std::numbers::pi / 180;
+  const double ring = std::cos(kFirstLookElevationDegrees * kDegree);
+  const Vec3d direction{ring * std::sin(kFirstLookAzimuthDegrees * kDegree),
+                        std::sin(kFirstLookElevationDegrees * kDegree),
+                        ring * std::cos(kFirstLookAzimuthDegrees * kDegree)};
+  const RenderCamera c = first_look({{-1, 1, 2}, {3, 0, 3}, {0, 0.5, 4}}, direction);
+  EXPECT_LT(length(c.eye - Vec3d{4.711566046, 3.068762430, 9.980440491}), 1e-8);
+  EXPECT_LT(length(c.z - direction), 1e-12);
+  EXPECT_NEAR(c.tan_half_fov, std::tan(16 * kDegree), 1e-12);
 }
 
 TEST(PosterCamera, HoldsAllPositionsWithTheMargin) {

@@ -3,13 +3,18 @@
 import { InputError, TexmeshError } from '../format/errors';
 
 const slowHosts = new Set<string>();
-/** Once a host: that it sends no parts of files; '' where it does, or was told. */
-export function slowHostNote(form: string, url: string): string {
+/** Once a host: what it does that costs speed; '' where nothing does, or the host was named. */
+export function slowHostNote(form: string, compressed: boolean, url: string): string {
   const { origin } = new URL(url);
-  if (form !== 'whole' || slowHosts.has(origin)) return '';
+  if ((form !== 'whole' && !compressed) || slowHosts.has(origin)) return '';
   slowHosts.add(origin);
-  return `${origin} sends no parts of files (range requests, status 206): the whole package is read before ` +
-    'the first picture. Allow ranges, or put an unpacked package (texmesh unpack) beside it.';
+  const whole = form === 'whole'
+    ? ' sends no parts of files (range requests, status 206): the whole package is read before the first ' +
+      'picture. Allow ranges, or put an unpacked package (texmesh unpack) beside it.' : '';
+  const packed = ' compresses packages (Content-Encoding), which are compressed already. That costs time, ' +
+    'and parts of files may be lost by it. Switch it off for .texmesh, and for all but .json of unpacked ' +
+    'packages.';
+  return origin + whole + (compressed ? (whole && ' The host also') + packed : '');
 }
 
 /** What most often causes an error, '' where nobody knows; `page`, `url`: addresses of page and package. */

@@ -216,10 +216,7 @@ export class TexmeshViewer extends HTMLElement {
     this.model_ = model;
     const tell = (name: string, detail: object = {}): void =>
       void this.dispatchEvent(new CustomEvent(name, { detail }));
-    model.on('open', ({ package: { form } }) => {
-      if (form === 'whole') void this.tellOwner_(({ slowHostNote }) => slowHostNote(form, model.url));
-      this.controls_();
-    });
+    model.on('open', () => this.controls_());
     model.on('first-picture', () => {
       // A poster of nothing does not fade: each frame of that would draw the whole page.
       poster.classList.toggle('fades', this.hasPoster_);
@@ -242,6 +239,9 @@ export class TexmeshViewer extends HTMLElement {
     });
     model.on('phase', ({ phase }) => (bar.hidden = phase !== 'opening' && phase !== 'turn'));
     model.on('loaded', () => {
+      const { form, client: { compressed } } = model.package!;
+      if (form === 'whole' || compressed)
+        void this.tellOwner_(({ slowHostNote }) => slowHostNote(form, compressed, model.url));
       void this.showRights_(model.package);
       tell('load', { url: model.url });
     });

@@ -121,5 +121,12 @@ export const lossUnit = 2 ** 40; // 2^40: losses as spend_bytes counts them
 export const leastWeight = 0.001; // of a group beside the others
 export const doneBytes = 1e-06; // bytes: what rounding may leave of a transfer
 export const forEver = 1000000000; // a time that nobody waits for
+/**
+ * How posters and viewers look at an object first: a camera of this vertical field of view looks at the
+ * middle of the object's box, from this angle round the vertical axis and above the horizontal plane.
+ */
+export const firstLookFovDegrees = 32;
+export const firstLookAzimuthDegrees = 28;
+export const firstLookElevationDegrees = 18;
 export const foveaRadiusDegrees = 0.5;
 export const halfAcuityDegrees = 2.3;

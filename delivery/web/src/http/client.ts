@@ -15,6 +15,8 @@ export class HttpClient {
   /** Least time from asking to the answer's head, without the first request, which opens the connection. */
   rttS = 0;
   received = 0;
+  /** A server has compressed files that are compressed already. */
+  compressed = false;
   /** Requests that have ended. */
   readonly records: RequestRecord[] = [];
   readonly listeners = new Set<(record: RequestRecord) => void>();
@@ -78,6 +80,8 @@ export class HttpClient {
         ? Number(header('content-length')) : -1;
       Object.assign(answer, { status, url: response.url || url, etag: etag[0] === '"' ? etag : '', length,
         type: header('content-type'), range: contentRange(header('content-range')) });
+      this.compressed ||= status < 300 && !/json|html/.test(answer.type) &&
+        /\w/.test(header('content-encoding').replace('identity', ''));
       const reader = record.ok ? body?.getReader() : undefined;
       while (reader && !answer.tooLong) {
         const { done, value } = await reader.read();

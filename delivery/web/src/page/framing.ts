@@ -1,4 +1,5 @@
 import { type PerspectiveCamera, Spherical, Vector3 } from 'three';
+import { firstLookAzimuthDegrees, firstLookElevationDegrees } from '../format/shared_numbers';
 
 /** A camera's place: degrees round the vertical axis and from it; distance, 1 where the object just fits. */
 export interface Orbit {
@@ -6,8 +7,9 @@ export interface Orbit {
   phiDegrees: number;
   distance: number;
 }
-/** From a little above, the front to the left. */
-export const defaultOrbit: Orbit = { thetaDegrees: 28, phiDegrees: 72, distance: 1 };
+/** From a little above, the front to the left, as posters have it. */
+export const defaultOrbit: Orbit =
+  { thetaDegrees: firstLookAzimuthDegrees, phiDegrees: 90 - firstLookElevationDegrees, distance: 1 };
 
 const radians = Math.PI / 180;
 /** Puts the camera so that it sees a box whole, with its aspect and field of view. Gives the box's middle. */

@@ -6,6 +6,7 @@ import type { LoadEvents, LoadOptions, LoadedModel, Turn } from '../scene/api';
 import { displayOf } from '../scene/camera';
 import { Emitter } from '../scene/events';
 import { daylight } from './daylight';
+import { firstLookFovDegrees } from '../format/shared_numbers';
 import { type Orbit, defaultOrbit, frame } from './framing';
 import type { PagePlace } from './schedule';
 
@@ -94,7 +95,7 @@ export class PageModel {
 
   constructor(private readonly host_: Host, readonly canvas: HTMLCanvasElement, readonly url: string,
       private readonly options_: PageModelOptions) {
-    this.camera = options_.camera ?? new PerspectiveCamera(32, 1, 0.01, 100);
+    this.camera = options_.camera ?? new PerspectiveCamera(firstLookFovDegrees, 1, 0.01, 100);
     const lamp = daylight(this.scene);
     this.camera.add(lamp, lamp.target);
     this.scene.add(this.camera);

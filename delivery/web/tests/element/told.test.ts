@@ -41,9 +41,11 @@ it.each(cases)('%s: visitors get a sentence, the console the rest', (_, error, u
 });
 
 it('a host that costs speed is named once', () => {
-  expect(slowHostNote('range', own)).toBe('');
-  expect(slowHostNote('whole', own)).toMatch(/museum\.example sends no parts/);
-  expect(slowHostNote('whole', own)).toBe('');
-  expect(slowHostNote('files', foreign)).toBe('');
-  expect(slowHostNote('whole', foreign)).toMatch(/files\.example/);
+  expect(slowHostNote('range', false, own)).toBe('');
+  expect(slowHostNote('whole', false, own)).toMatch(/museum\.example sends no parts.*beside it\.$/);
+  expect(slowHostNote('whole', true, own)).toBe('');
+  expect(slowHostNote('files', false, foreign)).toBe('');
+  expect(slowHostNote('files', true, foreign)).toMatch(/^https:\/\/files\.example compresses packages/);
+  expect(slowHostNote('whole', true, 'https://both.example/a'))
+    .toMatch(/sends no parts.* The host also compresses/);
 });

@@ -67,3 +67,14 @@ describe('the window', () => {
     expect(await mostAtOnce('http/1.1', { connections: 2, streams: 9 })).toBe(2);
   });
 });
+
+it.each([
+  ['gzip', 200, 'image/jpeg', true], ['br', 206, '', true], ['gzip', 200, 'application/json', false],
+  ['gzip', 404, 'image/jpeg', false], ['gzip', 200, 'text/html', false], ['identity', 200, '', false],
+  ['', 200, '', false],
+])('a server that compresses what is compressed is noticed: %s %s %s', async (encoding, status, type, is) => {
+  const headers = { 'Content-Encoding': encoding, 'Content-Type': type };
+  const client = new HttpClient({ fetch: () => Promise.resolve(new Response('x', { status, headers })) });
+  await client.get(url, { maxBytes: 9, kind: 'other' });
+  expect(client.compressed).toBe(is);
+});

@@ -1,5 +1,6 @@
 import { PerspectiveCamera, Vector3 } from 'three';
 import { expect, it } from 'vitest';
+import { firstLookFovDegrees } from '../../src/format/shared_numbers';
 import { frame } from '../../src/page/framing';
 
 it('the whole box is in the picture, as large as may be, from wherever', () => {
@@ -21,4 +22,12 @@ it('a point has a camera, too', () => {
   const camera = new PerspectiveCamera(32, 1, 0.01, 100);
   frame(camera, [1, 1, 1], [1, 1, 1]);
   expect(camera.position.toArray().every(Number.isFinite)).toBe(true);
+});
+
+// tests/stages/poster/poster_test.cpp has the same numbers for posters.
+it('viewers begin where posters look from', () => {
+  const camera = new PerspectiveCamera(firstLookFovDegrees, 1, 0.01, 100);
+  frame(camera, [-1, 0, 2], [3, 1, 4]);
+  for (const [k, is] of [4.711566046, 3.068762430, 9.980440491].entries())
+    expect(camera.position.getComponent(k)).toBeCloseTo(is, 8);
 });

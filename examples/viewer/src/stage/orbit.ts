@@ -1,7 +1,7 @@
 import { Box3, MathUtils, PerspectiveCamera, Spherical, Vector3 } from 'three';
 import { OrbitControls } from 'three/addons/controls/OrbitControls.js';
+import { firstLookFovDegrees, frame } from 'texmesh';
 
-const kFieldOfViewDegrees = 32;
 const kTurnDegrees = 6; // per press of an arrow key
 const kNearer = 0.85; // per press of +
 
@@ -9,7 +9,7 @@ const kNearer = 0.85; // per press of +
  * A camera that goes round the object by mouse, touch and keyboard. Calls `onMove` when the camera has moved.
  */
 export class Orbit {
-  readonly camera = new PerspectiveCamera(kFieldOfViewDegrees, 1, 0.01, 100);
+  readonly camera = new PerspectiveCamera(firstLookFovDegrees, 1, 0.01, 100);
   private readonly controls: OrbitControls;
   private readonly bounds = new Box3(new Vector3(-1, -1, -1), new Vector3(1, 1, 1));
 
@@ -38,20 +38,13 @@ export class Orbit {
     this.home();
   }
 
-  /** The whole object, the sphere round its box, from a little above, its front to the left. */
+  /** The whole object, as its poster shows it. */
   home(): void {
-    const centre = this.bounds.getCenter(new Vector3());
-    const radius = Math.max(this.bounds.getSize(new Vector3()).length() / 2, 1e-9);
-    const half = MathUtils.degToRad(kFieldOfViewDegrees) / 2;
-    const narrow = Math.min(1, this.camera.aspect);
-    const distance = radius / Math.sin(Math.atan(Math.tan(half) * narrow));
-    this.camera.position.setFromSpherical(new Spherical(distance, MathUtils.degToRad(72),
-      MathUtils.degToRad(28))).add(centre);
-    this.camera.near = distance / 500;
-    this.camera.far = distance * 20;
-    this.camera.updateProjectionMatrix();
+    const { min, max } = this.bounds;
+    const centre = frame(this.camera, min.toArray(), max.toArray());
+    const distance = this.camera.position.distanceTo(centre);
     this.controls.target.copy(centre);
-    this.controls.minDistance = radius / 50;
+    this.controls.minDistance = min.distanceTo(max) / 100;
     this.controls.maxDistance = distance * 8;
     this.moved();
   }
