@@ -1,9 +1,8 @@
 #pragma once
-// Inside the room only: one proxy of a given number of bytes, how it looks beside S_0, and how a nested scale
-// with the source's atlas looks for the same bytes.
+// Inside the room only: one proxy of a given number of bytes.
 #include "stages/data/proxies.h"
 #include "stages/proxies/coding/proxy_glb.h"
-#include "stages/render/shade.h"
+#include "stages/render/scale_pictures.h"
 
 namespace texmesh {
 
@@ -17,75 +16,6 @@ struct ShownModel {
 /// What a viewer gets of a proxy's file.
 ShownModel shown_proxy(const AtlasMesh& mesh, const RoundedMesh& rounded,
                        const std::vector<MaterialGroup>& groups, const ProxyPictures& pictures);
-
-/// Displayed heights of the longest side of the bounding box.
-inline constexpr double kSmallPx = 128, kMiddlePx = 256, kLargePx = 512;
-
-/// Pictures of S_0 at one displayed height, from four sides; at kLargePx from two. Constant once made.
-struct ReferenceViews {
-  struct View {
-    RenderCamera camera;
-    std::uint32_t side_px = 0;
-    FlipPicture picture;
-  };
-  RenderEnvironment environment;
-  std::vector<View> views;
-};
-ReferenceViews reference_views(const Mesh& mesh, const ShownMaterials& shown, double displayed_px,
-                               const RunContext& context);
-
-/// What pictures of the scene from the same places differ by. Half of the views will do where their mean is
-/// more than `hopeless`.
-FlipSum picture_loss(const ReferenceViews& reference, const RenderScene& scene,
-                     const std::vector<RenderTexture>& textures, const RunContext& context,
-                     double hopeless = 1);
-
-/// What bytes buy of nested scales and of textures without losses of coding.
-struct RivalPrices {
-  double mesh = 1;              // times an estimate of Draco's meshes
-  double bits_per_texel = 1.2;  // of a JPEG of middle quality, the texels of the whole image
-  double besides = 0;           // bytes of what else is fetched
-  double loss = 1;              // by coding, times FLIP
-};
-
-/// Nested scales with textures that a proxy's bytes buy. Bytes are estimated, and textures are those of the
-/// mip that fits, without losses of coding. By the default prices such a scale is better than the real one.
-/// Losses are mean FLIP beside `views`.
-class CompetingScales {
- public:
-  /// All must outlive it.
-  CompetingScales(const NestedScales& scales, const ShownMaterials& shown, const ReferenceViews& views);
-
-  /// Whether one of them loses at most as much as a proxy of so many bytes.
-  bool win(std::uint64_t bytes, double flip, const RivalPrices& prices, const RunContext& context);
-  /// Whether the likeliest one does; the others are not looked at.
-  bool likeliest_wins(std::uint64_t bytes, double flip, const RivalPrices& prices, const RunContext& context);
-  /// What plans of a package with proxies pay for a scale that looks like those: besides mesh and textures
-  /// they take tables and the coarsest scale's mesh, with which materials come.
-  RivalPrices prices_in_plans() const;
-
- private:
-  struct Competitor {
-    std::size_t scale = 0, dropped_levels = 0;  // of the textures
-    auto operator<=>(const Competitor&) const = default;
-  };
-  std::vector<Competitor> competitors(std::uint64_t bytes, const RivalPrices& prices) const;
-  double flip_of(const Competitor& competitor, double flip, const RunContext& context);
-
-  const NestedScales& scales_;
-  const ShownMaterials& shown_;
-  const ReferenceViews& views_;
-  std::vector<double> mesh_bytes_;      // per scale
-  std::map<Competitor, double> known_;  // FLIP of all views; found once
-};
-
-/// Bytes of S_0's whole mesh, coded; within 20 % for scans.
-double whole_mesh_bytes(const NestedScales& scales);
-
-/// Whether S_0's whole mesh, coded, leaves so much of the bytes to the source's textures that no atlas of
-/// a proxy's own can win. An atlas in pieces costs more than its texels, so it leaves its proxies a chance
-/// for longer.
-bool whole_mesh_is_small(const NestedScales& scales, std::uint64_t bytes);
 
 /// What a proxy is made of. Fitted, see first_form() and best_of() in proxies.cpp.
 struct ProxyForm {

@@ -22,13 +22,6 @@ constexpr double kFirstShare = 0.55;
 constexpr std::size_t kMostBaked = 250'000;
 constexpr double kFarthestBaked = 2e-4;  // of the diagonal
 
-/// Source textures need not be finer than what a proxy and the pictures show of them.
-std::uint32_t least_side_px(const std::vector<Material>& materials) {
-  std::size_t used = 0;
-  for (const Material& m : materials) for_each_texture(m, [&](const TextureRef& t) { used += t.used(); });
-  return used > 64 ? 256 : used > 24 ? 512 : used > 8 ? 1024 : 2048;
-}
-
 /// Whether occlusion, roughness and metal are not the same everywhere.
 bool data_varies(const std::vector<RenderMaterial>& materials) {
   return std::ranges::any_of(materials, [&](const RenderMaterial& m) {
@@ -323,7 +316,7 @@ Proxies make_proxies(const NestedScales& scales, const std::vector<Material>& ma
   inner.progress = nullptr;
   const Mesh mesh = baked_mesh(scales, inner);
   const ShownMaterials shown =
-      shown_materials(materials, fragments, pixels, mesh, least_side_px(materials), inner);
+      shown_materials(materials, fragments, pixels, mesh, enough_side_px(materials), inner);
   MaterialGroups groups = find_groups(mesh, shown.materials);
   groups.mip_levels = reads_mip_levels(materials);
   const BakeSource source(mesh, shown, groups);

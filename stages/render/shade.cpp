@@ -7,10 +7,10 @@ namespace texmesh {
 namespace {
 
 /// Triangles of an opaque pixel that are shaded: as many as a graphics processor with four samples a pixel
-/// shades at most. In pictures of at most kSmallPx all of them are: with a dozen a pixel four are noise, and
-/// no scale of a turtle was like S_0 below 100 px.
+/// shades at most. In pictures of at most kSmallSidePx all of them are: with a dozen a pixel four are noise,
+/// and no scale of a turtle was like S_0 below 100 px.
 constexpr std::size_t kMostShaded = 4;
-constexpr std::uint32_t kSmallPx = 200;
+constexpr std::uint32_t kSmallSidePx = 200;
 constexpr std::size_t kSamples = std::size_t{kSamplesPerSide} * kSamplesPerSide;
 using Curve = SampledCurve<8192>;
 
@@ -196,7 +196,7 @@ PictureVariants shade_variants(const RenderScene& scene, const Visibility& visib
   const std::vector<std::uint32_t>& places = out.places();
   const std::vector<std::uint32_t> order = by_squares(places, visibility.side_px);
   parallel_for(context, order.size(), 256, [&](std::size_t begin, std::size_t end) {
-    PixelShader pixel(shader, out, environment.background, visibility.side_px <= kSmallPx);
+    PixelShader pixel(shader, out, environment.background, visibility.side_px <= kSmallSidePx);
     for (std::size_t i = begin; i < end; ++i) {
       const std::uint32_t at = order[i], place = places[at], first = visibility.first[place];
       pixel.shade(at, {visibility.fragments.data() + first, visibility.first[place + 1] - first});

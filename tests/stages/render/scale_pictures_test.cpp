@@ -1,10 +1,10 @@
-#include "stages/proxies/make_proxy.h"
+#include "stages/render/scale_pictures.h"
 
 #include <gtest/gtest.h>
 
 #include "tests/support/meshes.h"
 
-namespace texmesh::picture_losses_scales_test {
+namespace texmesh::scale_pictures_test {
 
 NestedScales alone(Mesh mesh) {
   NestedScales out;
@@ -90,4 +90,4 @@ TEST_F(Competitors, ManyQuestionsHaveTheAnswersOfOne) {
   }
 }
 
-}  // namespace texmesh::picture_losses_scales_test
+}  // namespace texmesh::scale_pictures_test
