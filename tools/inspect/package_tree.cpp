@@ -267,6 +267,7 @@ void check_fragment_files(PackageStore& folder, const std::vector<ContainerEntry
                      "none of that name");
   }
   const FragmentIndex index = read_fragment_index(folder.read(index_ref, 0, index_ref.bytes));
+  if (index.planes.empty() && files.empty()) return;
   if (!findings.require_equal(tables.planes.size(), index.planes.size(), "fragment-file", kFragmentIndexPath,
                               "/planes"))
     return;
@@ -296,12 +297,12 @@ void unpack_package(const std::string& package_path, const std::string& folder,
   for (const EntryRef& e : container_order(package)) tree.add(e.path, package.entry(e));
   if (const auto credential = content_credential(package.store()))
     tree.add(kContentCredentialPath, *credential);
-  if (options.fragment_files) {
-    const FragmentIndex index = make_fragment_files(
-        package, [&](const std::string& path, const Bytes& jpeg) { tree.add(path, jpeg); });
-    const std::string json = to_json_line(index);
-    tree.add(kFragmentIndexPath, Bytes(json.begin(), json.end()));
-  }
+  FragmentIndex index;
+  if (options.fragment_files)
+    index = make_fragment_files(package,
+                                [&](const std::string& path, const Bytes& jpeg) { tree.add(path, jpeg); });
+  const std::string json = to_json_line(index);
+  tree.add(kFragmentIndexPath, Bytes(json.begin(), json.end()));
   tree.publish();
 }
 

@@ -24,7 +24,8 @@ void pack_folder(const std::string& folder, const std::string& package);
 
 /// A tree made with `unpack --fragments files` holds, beside the entries of the package, every fragment as a
 /// complete image file (fragment_file_path) for servers without Range requests, and this index of them
-/// (schemas/fragments.v1.schema.json). Neither is part of the package: `pack` leaves them out again.
+/// (schemas/fragments.v1.schema.json). Neither is part of the package: `pack` leaves them out again. Other
+/// trees have an index without planes: a browser that asked for it in vain would print an error.
 inline constexpr const char* kFragmentIndexPath = "fragments.json";
 
 /// Bytes and digests of the fragment files of one package, in the order in which a client wants them.

@@ -44,7 +44,7 @@ struct Tree : ::testing::Test {
 TEST_F(Tree, PackAfterUnpackGivesTheSameBytes) {
   unpack_package(folder / "a.texmesh", folder / "tree", {});
   EXPECT_EQ(verify(folder / "tree"), "");
-  EXPECT_EQ(files_beneath(folder / "tree").size(), 14u);
+  EXPECT_EQ(files_beneath(folder / "tree").size(), 14u + 1);
   pack_folder(folder / "tree", folder / "b.texmesh");
   EXPECT_EQ(read_text(folder / "b.texmesh"), text_of(package));
   expect_names({"a.texmesh", "b.texmesh", "tree"});
@@ -130,6 +130,16 @@ TEST_F(Tree, FragmentFilesAreCompleteJpegs) {
           decode_jpeg({reinterpret_cast<const std::uint8_t*>(jpeg.data()), jpeg.size()}, 1 << 20);
       EXPECT_EQ(p.width_px, 32u);
     }
+}
+
+TEST_F(Tree, SaysThatItHasNoFragmentFiles) {
+  unpack_package(folder / "a.texmesh", folder / "tree", {});
+  EXPECT_EQ(read_text(folder / "tree/fragments.json"), "{\"version\":1,\"planes\":[]}");
+  EXPECT_EQ(verify(folder / "tree"), "");
+  const fs::path file = fs::path(folder / "tree") / fragment_file_path(0, 1, 2);
+  fs::create_directories(file.parent_path());
+  write_text(file.string(), "of something else");
+  EXPECT_NE(verify(folder / "tree").find("[fragment-file]"), std::string::npos);
 }
 
 TEST_F(Tree, FragmentFilesThatDoNotFitAreFound) {

@@ -38,13 +38,15 @@ std::string heat_legend() {
 }
 
 std::string switch_table(const Report& report) {
-  Table table("FLIP of each scale against S_0 at its switch size; the worst view counts.",
-              {{"Scale", kScaleName},
-               {"Triangles", kGrouped},
-               "Up to, px",
-               {"Mean FLIP", 3},
-               {"95th percentile", 3},
-               "Verdict"});
+  Table table(
+      "How far each scale looks from S_0, the finest, at the largest size at which it is shown. FLIP 0: no "
+      "difference; 1: black beside white. The worst view counts.",
+      {{"Scale", kScaleName},
+       {"Triangles", kGrouped},
+       "Shown up to, px",
+       {"Mean FLIP", 3},
+       {"95th percentile", 3},
+       "Verdict"});
   for (const SwitchSize& s : report.switches)
     table.row({s.scale, s.triangles, px(s.up_to_px), s.views.worst_mean(), s.views.worst_p95(),
                Cell::markup("", answer(s.holds(report.options.limits)))});
@@ -53,10 +55,10 @@ std::string switch_table(const Report& report) {
 
 std::string switch_figure(PackagePictures& pictures, const SwitchSize& s, Report& report) {
   std::string out = fmt::format(
-      "<figure>\n<figcaption><h3>S_{}, shown up to {} px</h3>{} triangles. Mean FLIP {:.3f} and 95th "
-      "percentile {:.3f} in the worst of {} views: {}.{}</figcaption>\n",
-      s.scale, px(s.up_to_px), thin_grouped(s.triangles), s.views.worst_mean(), s.views.worst_p95(),
-      s.views.mean.size(), answer(s.holds(report.options.limits)),
+      "<figure>\n<figcaption><h3>S_{}, shown up to {} px</h3>{} triangles. In the worst of {} views, "
+      "all pixels differ by {:.3f} in the mean, 95 % of them by at most {:.3f}: {}.{}</figcaption>\n",
+      s.scale, px(s.up_to_px), thin_grouped(s.triangles), s.views.mean.size(), s.views.worst_mean(),
+      s.views.worst_p95(), answer(s.holds(report.options.limits)),
       s.rendered_px < s.up_to_px ? fmt::format(" Rendered at {:.0f} px, the largest there is.", s.rendered_px)
                                  : "");
   const std::uint32_t side_px = pictures.side_for(s.rendered_px);
@@ -116,13 +118,16 @@ std::string switch_section(PackagePictures& pictures, Report& report) {
     return html_section("switches", "Switch sizes",
                         "<p>The package shows S_0 at every size: no coarser scale has a step.</p>\n");
   std::string body = fmt::format(
-      "<p>A viewer shows a coarse scale up to its switch size, the displayed height of the object in px. "
-      "Each scale is rendered at that height beside S_0, lit, with the textures at their highest rung. It "
-      "holds where no view's mean FLIP is above {:g} and no view's 95th percentile above {:g}.</p>\n",
+      "<p>While the object is small on the screen, a viewer shows a coarse scale of it: up to the scale's "
+      "switch size, the height of the object in px. Here each scale stands at that height beside S_0, lit, "
+      "with its best textures. It holds, which means that nobody should see the switch, where in each view "
+      "the mean FLIP is at most {:g}, and 95 % of the pixels have at most {:g}.</p>\n",
       report.options.limits.mean, report.options.limits.p95);
-  body += switch_table(report) +
-          "<p class=\"quiet\">Maps show FLIP by colour. Small pictures are enlarged by whole numbers.</p>\n" +
-          heat_legend();
+  body +=
+      switch_table(report) +
+      "<p class=\"quiet\">The third picture of each row shows where the first two differ: the brighter, the more "
+      "(colours below). Small pictures are enlarged; each square is a pixel.</p>\n" +
+      heat_legend();
   for (const SwitchSize& s : report.switches) body += switch_figure(pictures, s, report);
   return html_section("switches", "Switch sizes", body);
 }
@@ -132,13 +137,14 @@ std::string source_section(PackagePictures& pictures, const RenderedModel& sourc
   const SourceComparison& c = *report.source;
   const std::uint32_t side_px = pictures.side_for(c.displayed_px);
   std::string body = fmt::format(
-      "<p>The model file <strong>{}</strong> beside S_0 with its textures at the highest rung, {:.0f} px high: "
-      "mean FLIP {:.3f} and 95th percentile {:.3f} in the worst of {} views. That is what coding costs.</p>\n"
+      "<p>The model file <strong>{}</strong> beside S_0 with its best textures, {:.0f} px high. In the worst of {} "
+      "views, all pixels differ by {:.3f} in the mean, 95 % of them by at most {:.3f}. That is what the package's "
+      "compression changes.</p>\n"
       "<figure>\n<figcaption class=\"quiet\">The worst view, and one of the front.</figcaption>\n",
-      markup_escaped(c.file), c.displayed_px, c.views.worst_mean(), c.views.worst_p95(), c.views.mean.size());
+      markup_escaped(c.file), c.displayed_px, c.views.mean.size(), c.views.worst_mean(), c.views.worst_p95());
   for (const ViewNumber view :
        {ViewNumber{static_cast<int>(c.views.worst()), report.options.views}, ViewNumber{0, 1}})
-    body += picture_row({view.count == 1 ? "source-front" : "source-worst", "Source", "S_0, highest rung",
+    body += picture_row({view.count == 1 ? "source-front" : "source-worst", "Source", "S_0, best textures",
                          "S_0 beside the source"},
                         pictures.picture_of(source, offset, view, side_px),
                         pictures.picture(0, view, side_px), report.files);
@@ -150,9 +156,11 @@ constexpr double kLeastHeight = 16;   // px, of the step function's plot
 
 std::string curve_figure(const QualityCurves& curves) {
   Plot plot;
-  plot.title = fmt::format("Predicted FLIP against bytes at {:.0f} px", curves.displayed_px);
-  plot.x_name = "bytes that a viewer reads";
-  plot.y_name = "predicted FLIP";
+  plot.title =
+      fmt::format("How far a {:.0f} px high picture is from the best one, by the bytes that were read",
+                  curves.displayed_px);
+  plot.x_name = "bytes that a viewer has read";
+  plot.y_name = "difference from the best picture (predicted FLIP)";
   plot.x_low = 1e30, plot.x_high = 0, plot.y_high = 0;
   const auto widen = [&](const QualityPoint& p) {
     plot.x_low = std::min(plot.x_low, static_cast<double>(p.bytes));
@@ -168,10 +176,12 @@ std::string curve_figure(const QualityCurves& curves) {
     return points;
   };
   for (std::size_t k = 0; k < curves.scales.size(); ++k)
-    plot.series.push_back({k == 0 ? "each scale at its rungs" : "", "q", points_of(curves.scales[k])});
+    plot.series.push_back(
+        {k == 0 ? "a scale, with ever better textures" : "", "q", points_of(curves.scales[k])});
   if (!curves.proxies.empty())
-    plot.series.push_back({"proxies", "b", points_of(curves.proxies), true, false, true});
-  plot.series.push_back({"the best choice for a budget", "a", points_of(curves.budgets), true});
+    plot.series.push_back(
+        {"proxies, small files of the whole object", "b", points_of(curves.proxies), true, false, true});
+  plot.series.push_back({"the best for so many bytes", "a", points_of(curves.budgets), true});
   plot.x_low = std::max(plot.x_low * 0.9, 1.0), plot.x_high = std::max(plot.x_high * 1.1, plot.x_low * 1.5);
   return fmt::format("<figure>\n<figcaption><h3>Displayed {:.0f} px high</h3></figcaption>\n",
                      curves.displayed_px) +
@@ -179,8 +189,9 @@ std::string curve_figure(const QualityCurves& curves) {
 }
 
 Table budget_table(const std::vector<QualityCurves>& curves) {
-  Table table("What a budget buys: bytes in all, the scale or proxy that is chosen, predicted FLIP.",
-              {"Displayed, px", {"Bytes", kGrouped}, "Mesh", {"FLIP", 3}});
+  Table table(
+      "What so many bytes show at best: a scale or a proxy, and how far it looks from the best picture.",
+      {"Displayed, px", {"Bytes", kGrouped}, "Mesh", {"FLIP", 3}});
   for (const QualityCurves& c : curves)
     for (std::size_t i = 0; i < c.budgets.size(); i += 3) {
       const QualityPoint& b = c.budgets[i];
@@ -215,8 +226,10 @@ std::string kinds_bar(const std::vector<KindBytes>& kinds, double sum) {
 }
 
 Table plane_table(PackageReader& package) {
-  Table table("Texture planes: full-size ones and their mips.",
-              {"Plane", "Role", "Size, px", "Fragments", "Rungs", "Lowest rung", "Highest rung", "All"});
+  Table table(
+      "Textures in full size, then their mips: the same texture with half the sides, and so on. Each is "
+      "stored in several qualities, its rungs.",
+      {"Plane", "Role", "Size, px", "Fragments", "Rungs", "Lowest rung", "Highest rung", "All"});
   for (std::size_t p = 0; p < package.textures().size(); ++p) {
     const TextureInfo& t = package.textures()[p];
     std::uint64_t all = t.tables.bytes;
@@ -234,16 +247,16 @@ struct Rule {
   const char* name;
   const char* colour;
 };
-constexpr Rule kRules[] = {{StepRule::kFlip, "lit pictures (FLIP), the default", "a"},
-                           {StepRule::kJnd, "just-noticeable difference", "b"},
-                           {StepRule::kError, "error of one pixel", "c"},
-                           {StepRule::kEdge, "O_V / E_S", "d"}};
+constexpr Rule kRules[] = {{StepRule::kFlip, "lit pictures look alike (FLIP), the default", "a"},
+                           {StepRule::kJnd, "changes are just not noticed (JND)", "b"},
+                           {StepRule::kError, "points are off by a pixel at most", "c"},
+                           {StepRule::kEdge, "the edges are a pixel long (O_V / E_S)", "d"}};
 
 std::string step_plot(const Manifest& m) {
   Plot plot;
-  plot.title = "Step function: scale shown by displayed height, by each rule";
-  plot.x_name = "displayed height, px";
-  plot.y_name = "scale number; 0 is S_0";
+  plot.title = "Which scale is shown at which height on the screen, by each rule";
+  plot.x_name = "height of the object on the screen, px";
+  plot.y_name = "number of the scale; 0 is S_0, the finest";
   plot.x_low = kLeastHeight, plot.x_high = 4096;
   plot.y_high = m.scales.back().scale;
   for (const Rule& rule : kRules) {
@@ -263,9 +276,10 @@ std::string step_plot(const Manifest& m) {
 
 std::string curve_section(PackageReader& package, const Report& report) {
   std::string body = fmt::format(
-      "<p>Each grey line is a scale with its textures from previews alone to the highest rung. The coloured "
-      "line is what <code>texmesh plan --budget</code> chooses. FLIP is predicted against S_0 with the "
-      "source's texels; the predictions miss measured values by {:.1f} % in the mean.</p>\n",
+      "<p>The more bytes a viewer has read, the more its picture looks like the best one, S_0 with the source's "
+      "texels. Each grey line is a scale whose textures get better from left to right. The coloured line is "
+      "what a viewer does with so many bytes (<code>texmesh plan --budget</code>). The values are predictions, "
+      "which miss measured ones by {:.1f} % in the mean.</p>\n",
       100 * static_cast<double>(package.quality().error));
   for (const QualityCurves& c : report.curves) body += curve_figure(c);
   return html_section("curves", "Quality and bytes", body + budget_table(report.curves).html());
@@ -276,7 +290,7 @@ std::string bytes_section(PackageReader& package) {
       bytes_by_kind(package.manifest(), package.store().read_manifest().size(), package.entries());
   double sum = 0;
   for (const KindBytes& k : kinds) sum += static_cast<double>(k.bytes);
-  Table table("Bytes of the package's entries.",
+  Table table("What the package's bytes are for. An entry is a file within the package.",
               {"Kind", "Entries", {"Bytes", kGrouped}, {"Share, %", percent_form()}});
   for (std::size_t i = 0; i < kinds.size(); ++i)
     table.row(
@@ -294,8 +308,9 @@ std::string fragment_section(PackageReader& package, Report& report) {
   const std::size_t planes = full_size_planes(package.textures());
   if (planes == 0) return html_section("fragments", "Fragments", "<p>The package has no textures.</p>\n");
   std::string body =
-      "<p>Textures are cut into fragments that a viewer fetches one by one. Bright fragments take more, or "
-      "have more features. Outlines alone are fragments that nobody sees; they are not stored.</p>\n";
+      "<p>Textures are cut into fragments. A viewer fetches them one by one, and begins with those that are seen "
+      "most. The brighter a fragment, the more it has of what stands above the map. A fragment with an "
+      "outline alone is seen by nobody; it is not stored.</p>\n";
   for (std::uint32_t p = 0; p < std::min(planes, kMostMaps); ++p) {
     const TextureInfo& t = package.textures()[p];
     report.files.push_back({fmt::format("preview-{:03}.jpg", p), package.preview(p)});
@@ -319,8 +334,8 @@ std::string fragment_section(PackageReader& package, Report& report) {
 std::string step_section(PackageReader& package) {
   const Manifest& m = package.manifest();
   Table table(
-      "Displayed height in px up to which a scale is enough, by each rule; 0 = at no height. Scales that are "
-      "no step of the package's own function serve under limits of time or bytes.",
+      "The height on the screen, px, up to which a scale is enough, by each rule of the plot; 0: at no height. "
+      "Scales that are no step are shown where time or bytes do not allow more.",
       {{"Scale", kScaleName},
        {"Triangles", kGrouped},
        {"Bytes", kGrouped},
@@ -344,10 +359,10 @@ std::string proxy_figure(PackageReader& package, PackagePictures& pictures, std:
   const double height = m.proxy_sizes_px.back();
   const RenderedModel model = package_proxy(package, proxy, pictures.context());
   std::string out = fmt::format(
-      "<figure>\n<figcaption><h3>Proxy {}, {}</h3>{} triangles. Mean FLIP {:.3f} at {:.0f} px, over all measured "
-      "views.</figcaption>\n",
-      proxy, format_bytes(m.proxies[proxy].glb.bytes), thin_grouped(m.proxies[proxy].triangles),
-      m.proxies[proxy].flip.back(), height);
+      "<figure>\n<figcaption><h3>Proxy {}, {}</h3>{} triangles. At a height of {:.0f} px, the pixels of all measured views "
+      "differ from S_0's by {:.3f} in the mean.</figcaption>\n",
+      proxy, format_bytes(m.proxies[proxy].glb.bytes), thin_grouped(m.proxies[proxy].triangles), height,
+      m.proxies[proxy].flip.back());
   const std::uint32_t side_px = pictures.side_for(height);
   for (const auto& [view, name] : {std::pair{ViewNumber{0, 1}, "front"}, {ViewNumber{2, 6}, "side"}})
     out += picture_row({fmt::format("proxy{:02}-{}", proxy, name), fmt::format("S_0, {}", name),
@@ -361,8 +376,10 @@ std::string proxy_figure(PackageReader& package, PackagePictures& pictures, std:
 std::string proxy_section(PackageReader& package, PackagePictures& pictures, Report& report) {
   const Manifest& m = package.manifest();
   if (m.proxies.empty()) return "";
-  Table table("Proxies: the whole object in one file each, with an atlas of its own.",
-              {"Proxy", {"Bytes", kGrouped}, {"Triangles", kGrouped}, {"Vertices", kGrouped}, "Texture, px"});
+  Table table(
+      "Proxies: small files of the whole object, each with a texture of its own. FLIP says how far one "
+      "looks from S_0; 95 % of its pixels are at most P95 away.",
+      {"Proxy", {"Bytes", kGrouped}, {"Triangles", kGrouped}, {"Vertices", kGrouped}, "Texture, px"});
   for (const double px : m.proxy_sizes_px) table.column(fmt::format("FLIP at {:.0f} px", px));
   for (std::size_t k = 0; k < m.proxies.size(); ++k) {
     const ManifestProxy& p = m.proxies[k];
@@ -372,7 +389,7 @@ std::string proxy_section(PackageReader& package, PackagePictures& pictures, Rep
   }
   std::string body = fmt::format(
       "<p>A viewer shows the smallest proxy first: after {} of the package. Where a proxy's mean FLIP is at most "
-      "{:g} and its 95th percentile at most {:g}, nothing else is read.</p>\n",
+      "{:g}, and 95 % of its pixels have at most {:g}, it looks like S_0, and nothing else is read.</p>\n",
       format_bytes(start_bytes(m)), kSameFlip, kSameFlipP95);
   body += table.html();
   for (std::uint32_t k = 0; k < m.proxies.size(); ++k) body += proxy_figure(package, pictures, k, report);

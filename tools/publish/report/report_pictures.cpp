@@ -105,7 +105,7 @@ std::string picture_row(const PictureRow& row, const Picture& reference, const P
   };
   add("-reference", row.reference_name, row.alt + ", the reference", encode_srgb(reference));
   add("-tested", row.tested_name, row.alt, encode_srgb(tested));
-  add("-flip", "FLIP map", row.alt + ": map of the differences", heat);
+  add("-flip", "where they differ", row.alt + ": map of the differences", heat);
   return out + "</div>\n";
 }
 
@@ -119,8 +119,8 @@ std::vector<FragmentHeat> fragment_heats(PackageReader& package, std::uint32_t p
     if (t.rung_count() > 0) bytes[f] = static_cast<double>(bytes_to_show(t, t.rung_count() - 1, f)) / texels;
     density[f] = static_cast<double>(eta[f]);
   }
-  return {over_most("bytes per texel at the best rung", std::move(bytes)),
-          over_most("feature density of S_0 (eta)", std::move(density))};
+  return {over_most("bytes for each texel, at the best quality", std::move(bytes)),
+          over_most("how many features the shape has (eta)", std::move(density))};
 }
 
 std::string fragment_map(PackageReader& package, std::uint32_t plane, const FragmentHeat& heat,

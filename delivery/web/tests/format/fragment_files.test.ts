@@ -11,6 +11,7 @@ describe('small parts', () => {
     expect(files[0][0].get(3))
       .toEqual({ bytes: 10, sha256: new Uint8Array([0, 17, 34, 51, 68, 85, 102, 255]) });
     expect(files[0][0].has(1)).toBe(false);
+    expect(readFragmentFiles(text({ version: 1, planes: [] }))).toEqual([]); // there are no such files
     const broken = { ...plane, rungs: [{ bytes: [10], sha256: ['x'] }] };
     expect(() => readFragmentFiles(text({ version: 1, planes: [broken] }))).toThrow(FormatError);
     expect(() => readFragmentFiles(text({ version: 2, planes: [] }))).toThrow(FormatError);
