@@ -131,6 +131,8 @@ About read_about(std::span<const std::uint8_t> json) {
 
 About merge_about(About under, const About& over) {
   if (!over.licence.empty()) under.licence_url.clear();
+  if (!over.creator.empty() && over.creator != under.creator)
+    std::erase_if(under.identifiers, [](const NamedText& i) { return i.name == kCreatorScheme; });
   for (const TextField& f : kTextFields)
     if (!(over.*f.member).empty()) under.*f.member = over.*f.member;
   if (!over.identifiers.empty()) under.identifiers = over.identifiers;
@@ -141,6 +143,12 @@ About merge_about(About under, const About& over) {
   if (!over.source.empty()) under.source = over.source;
   if (!over.extras.empty()) under.extras = over.extras;
   return under;
+}
+
+std::string creator_url(const About& about) {
+  for (const NamedText& i : about.identifiers)
+    if (i.name == kCreatorScheme && is_web_url(i.text)) return i.text;
+  return "";
 }
 
 bool is_web_url(const std::string& text) {

@@ -50,9 +50,14 @@ std::string write_about(const About& about);
 /// JSON pointer.
 About read_about(std::span<const std::uint8_t> json);
 
-/// `over` wins field by field over `under`. A licence brings its own URL: that of another licence goes. A
-/// unit is one field, and so is a coordinate reference.
+/// `over` wins field by field over `under`. A licence brings its own URL: that of another licence goes, and
+/// so does the page of another creator. A unit is one field, and so is a coordinate reference.
 About merge_about(About under, const About& over);
+
+/// The identifier that is the creator's page.
+inline constexpr const char* kCreatorScheme = "creator";
+/// The creator's page; "" = not known.
+std::string creator_url(const About& about);
 
 /// Whether a text is an absolute http or https URL without blanks and control characters.
 bool is_web_url(const std::string& text);

@@ -200,6 +200,17 @@ void set_url(std::string& member, const std::string& value, std::string_view nam
     note_value(notes, place, name, "an http or https URL", value);
 }
 
+void set_creator(About& about, const std::string& value) {
+  about.creator = clean_about_text(value, kMaxAboutTextBytes);
+  std::erase_if(about.identifiers, [](const NamedText& i) { return i.name == kCreatorScheme; });
+  const std::size_t open = about.creator.rfind(" (");
+  if (open == std::string::npos || open == 0 || !about.creator.ends_with(')')) return;
+  const std::string url = about.creator.substr(open + 2, about.creator.size() - open - 3);
+  if (!is_web_url(url) || url.size() > kMaxAboutValueBytes) return;
+  add_about_value(about.identifiers, kCreatorScheme, url);
+  about.creator.resize(open);
+}
+
 /// The fields that are one text, or a list that a value is added to. False for other names.
 bool set_words(About& about, const std::string& name, const std::string& value) {
   if (name == "title")
@@ -207,7 +218,7 @@ bool set_words(About& about, const std::string& name, const std::string& value) 
   else if (name == "description")
     about.description = clean_about_text(value, kMaxAboutDescriptionBytes);
   else if (name == "creator" || name == "author")
-    about.creator = clean_about_text(value, kMaxAboutTextBytes);
+    set_creator(about, value);
   else if (name == "attribution" || name == "credit" || name == "copyright")
     about.attribution = clean_about_text(value, kMaxAboutTextBytes);
   else if (name == "capture" || name == "capture method")

@@ -39,7 +39,8 @@ void set_source_licence(About& about, const std::string& text, const std::string
 /// title, description, creator | author, licence | license, attribution | credit | copyright,
 /// source | source url, identifier, doi, capture | capture method, date | created, unit | units, up | up
 /// axis, crs | coordinate reference, epsg. False for any other name. A value that makes no sense costs a
-/// note.
+/// note. "N. N. (https://...)", as Sketchfab writes its authors, is the creator and, as an identifier, the
+/// creator's page.
 bool set_source_field(About& about, std::string_view name, const std::string& value, const std::string& place,
                       Notes& notes);
 

@@ -117,26 +117,16 @@ class ModelSource {
   /// The notes that an archive has beside its model, as texmesh writes them; "" without any. Where they
   /// cannot be read, `notes` says so. InputError when the archive is not what it was at open().
   std::string archived_notes(Notes& notes) {
-    if (lower_ending(path_.native()) != ".zip") return "";
-    const std::string name = path_.filename().string();
-    // Only a stamp that has settled tells that the file is still the same.
-    const bool settled = main_.stamp.is_settled(wall_clock_ns());
-    if (!settled) read_model();
-    std::string place = name, found, wrong;
-    try {
-      ArchiveFiles archive(settled ? open_file_source(path_.string()) : memory_source(bytes_, name),
-                           kAnyArchiveSize);
-      if (const auto file = archived_annotations(archive)) {
-        place += "/" + file->first;
-        found = write_annotations(read_source_annotations(file->second, place, notes));
-      }
-    } catch (const Error& e) {
-      wrong = std::string("the notes are left out: ") + e.what();
+    if (!is_archive()) return "";
+    if (!archived_) {
+      // Only a stamp that has settled tells that the file is still the same.
+      if (!has_bytes_ && !main_.stamp.is_settled(wall_clock_ns())) read_model();
+      read_archived_notes();
+      if (!has_bytes_ && stamp_of(path_.string()) != main_.stamp) refuse_changed();
+      forget_bytes();
     }
-    forget_bytes();
-    if (settled && stamp_of(path_.string()) != main_.stamp) refuse_changed();
-    if (!wrong.empty()) add_warning(notes, "annotations", place, wrong);
-    return found;
+    notes.insert(notes.end(), archived_->second.begin(), archived_->second.end());
+    return archived_->first;
   }
 
   /// For provenance: the model's own references, never the paths of this machine.
@@ -168,6 +158,22 @@ class ModelSource {
   [[noreturn]] void refuse_changed() const {
     throw InputError(path_.filename().string(), "", "a file that stays as it is while it is compiled",
                      "one that has changed meanwhile");
+  }
+  bool is_archive() const { return lower_ending(path_.native()) == ".zip"; }
+  /// Of the bytes, where they have been read, else of the file.
+  void read_archived_notes() {
+    std::string place = path_.filename().string();
+    auto& [text, said] = archived_.emplace();
+    try {
+      ArchiveFiles archive(has_bytes_ ? memory_source(bytes_, place) : open_file_source(path_.string()),
+                           kAnyArchiveSize);
+      if (const auto file = archived_annotations(archive)) {
+        place += "/" + file->first;
+        text = write_annotations(read_source_annotations(file->second, place, said));
+      }
+    } catch (const Error& e) {
+      add_warning(said, "annotations", place, std::string("the notes are left out: ") + e.what());
+    }
   }
   /// A file of a gigabyte need not wait for the package. Whoever needs it again reads it again.
   void forget_bytes() {
@@ -219,6 +225,7 @@ class ModelSource {
       refuse_too_large(path_.filename().string(), bytes_, memory_bytes_);
       ImportedModel m = import_model(path_.filename().string(), bytes_, resolver, options, context);
       requests = resolver.requests();
+      if (is_archive() && !archived_) read_archived_notes();
       forget_bytes();
       return m;
     } catch (const ResourceError&) {
@@ -240,6 +247,7 @@ class ModelSource {
   std::vector<FileRequest> known_;
   Bytes bytes_;
   bool has_bytes_ = false;
+  std::optional<std::pair<std::string, Notes>> archived_;  // an archive's notes, and what is wrong with them
   FileRequest main_;
   std::vector<FileRequest> requests_;
   std::shared_ptr<ImportedModel> imported_;

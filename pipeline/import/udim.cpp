@@ -38,6 +38,15 @@ bool is_there(const NameInModel& name, std::uint16_t tile, Resolver& resolver, c
 
 }  // namespace
 
+void warn_of_tiles(Notes& notes, const std::string& place, std::size_t tiles, std::size_t left_out) {
+  if (left_out > 0)
+    add_warning(
+        notes, "too-many-tiles", place,
+        "faces lie in " + std::to_string(tiles) + " UDIM tiles, and a model has at most " +
+            std::to_string(kMostMaterials) + " materials: " + std::to_string(left_out) +
+            " tiles are shown without their own pictures. Join pictures, or compile parts of the model");
+}
+
 TileMark tile_mark(std::string_view name) { return find_mark(name).kind; }
 
 std::string name_of_tile(std::string name, std::uint16_t tile) {
@@ -128,9 +137,11 @@ void TiledImages::split(Model& model, Resolver& resolver, const std::string& fil
   for (std::size_t t = 0; t < mesh.triangles.size(); ++t)
     if (uvs[mesh.triangle_material[t]]) tiles[mesh.triangle_material[t]].insert(tile_of(t));
   std::map<std::pair<std::size_t, std::uint16_t>, std::uint16_t> made;
+  std::size_t all = 0;
   for (std::size_t m = 0; m < materials; ++m) {
     if (!has_tiles(model.materials[m], tiles[m], resolver, options)) continue;
     const Material whole = model.materials[m];
+    all += tiles[m].size();
     for (const std::uint16_t tile : tiles[m]) {
       if (model.materials.size() >= kMostMaterials) break;
       Material material = of_tile(whole, tile, model, resolver, file_name, options);
@@ -142,6 +153,7 @@ void TiledImages::split(Model& model, Resolver& resolver, const std::string& fil
         model.materials.push_back(std::move(material));
     }
   }
+  warn_of_tiles(model.notes, file_name, all, all - made.size());
   for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
     std::uint16_t& material = mesh.triangle_material[t];
     if (!uvs[material]) continue;

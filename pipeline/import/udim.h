@@ -24,6 +24,10 @@ std::uint16_t tile_at(Vec2d uv);
 bool other_tile_is_there(const NameInModel& name, const std::set<std::uint16_t>& tiles, Resolver& resolver,
                          const ImportOptions& options);
 
+/// The warning where `left_out` of `tiles` tiles with faces have no material of their own, since a model has
+/// at most 65,535; none for 0.
+void warn_of_tiles(Notes& notes, const std::string& place, std::size_t tiles, std::size_t left_out);
+
 /// Pictures of tiles in formats whose materials are read before it is known where faces lie.
 class TiledImages {
  public:
@@ -32,7 +36,7 @@ class TiledImages {
                          const std::string& file_name, const std::string& place,
                          const ImportOptions& options);
   /// Materials with such pictures become one for each tile that their triangles lie in. Before
-  /// finish_model(). A tile that is not there is a missing texture.
+  /// finish_model(). A tile that is not there is a missing texture. Warns of tiles that are too many.
   void split(Model& model, Resolver& resolver, const std::string& file_name, const ImportOptions& options);
 
  private:

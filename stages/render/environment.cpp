@@ -175,15 +175,12 @@ constexpr SoftBox kBoxes[] = {{{0.62f, 0.72f, 0.55f}, 26, {4.6f, 4.5f, 4.35f}},
 constexpr Vec3f kZenith{0.33f, 0.35f, 0.39f}, kHorizon{0.45f, 0.44f, 0.43f}, kGround{0.255f, 0.235f, 0.205f};
 constexpr float kLog2E = 1.44269504f;
 
-// Daylight: what a hemisphere light of three.js with intensity 3 from #ffffff above and #d8d4cc below gives,
-// divided by pi.
-constexpr Vec3f kPaperAbove{0.955f, 0.955f, 0.955f}, kPaperBelow{0.653f, 0.627f, 0.577f};
 constexpr std::uint32_t kSkySide = 32, kSkyLevels = 8;
 
 /// As daylight.ts has it: rough surfaces see the hemisphere, mirrors a sky with more contrast.
 Vec3f sky_radiance(float up, float roughness) {
-  const float t = saturated((up + 0.6f) / 1.5f);
-  const float mirrored = 0.3f + 1.4f * (t * t * (3 - 2 * t));
+  const float t = saturated((up - kMirrorFrom) / kMirrorWidth);
+  const float mirrored = kMirrorLow + kMirrorRise * (t * t * (3 - 2 * t));
   const Vec3f paper = kPaperBelow + (kPaperAbove - kPaperBelow) * (0.5f + 0.5f * up);
   return Vec3f{mirrored, mirrored, mirrored} * (1 - roughness) + paper * roughness;
 }
@@ -248,7 +245,8 @@ RenderEnvironment daylight_environment(Vec3f x, Vec3f y, Vec3f z, bool metallic)
       return metallic ? sky_radiance(direction.y, roughness) : Vec3f{0, 0, 0};
     }));
   }
-  out.key = {normalized(x * -0.5f + y * 0.7f + z), Vec3f{2.2f, 2.2f, 2.2f}};
+  out.key = {normalized(x * kLampPlace.x + y * kLampPlace.y + z * kLampPlace.z),
+             Vec3f{kLampIntensity, kLampIntensity, kLampIntensity}};
   return out;
 }
 

@@ -46,6 +46,15 @@ RenderEnvironment prepare_environment(const Radiance& radiance, const KeyLight& 
 /// studio_radiance with studio_key_light, prepared when the library was built.
 RenderEnvironment studio_environment();
 
+/// Daylight in viewers and posters: radiance that paper mirrors from right above and from right below.
+inline constexpr Vec3f kPaperAbove{0.955f, 0.955f, 0.955f}, kPaperBelow{0.653f, 0.627f, 0.577f};
+/// Mirrors see a sky with more contrast: from this radiance so much brighter between two heights of the
+/// direction, the lower one and what it is to the higher one.
+inline constexpr float kMirrorLow = 0.3f, kMirrorRise = 1.4f, kMirrorFrom = -0.6f, kMirrorWidth = 1.5f;
+/// Where the lamp is that the camera carries, along its axes, and how bright.
+inline constexpr Vec3f kLampPlace{-0.5f, 0.7f, 1.0f};
+inline constexpr float kLampIntensity = 2.2f;
+
 /// The light in which viewers show objects (delivery/web/src/page/daylight.ts): daylight from above and a
 /// lamp that the camera carries; `x`, `y`, `z` are its axes, unit, +z from the object to the camera. Metals
 /// mirror a sky; without `metallic` surfaces shine under the lamp alone. A pure function with the same bits

@@ -539,15 +539,16 @@ Bytes code_beside(const ScaleCoding& coding, const GlbBeside& glb, const std::ve
   return write_scale(own, *glb.scale, materials, glb.images).glb;
 }
 
-/// The finest go until all GLBs together take no more than kMostOverFinest of S_0's.
+/// The finest go until all GLBs together take no more than kMostOverFinest of S_0's and kAnywayBytes.
 void leave_out_finest(const ScaleFiles& files, std::vector<GlbBeside>& made, Notes& notes) {
   const auto finest = static_cast<double>(files.files.front().glb.size());
-  double room = (kMostOverFinest - 1) * finest - static_cast<double>(files.files.back().glb.size());
+  double room = (kMostOverFinest - 1) * finest + kAnywayBytes;
+  room -= static_cast<double>(files.files.back().glb.size());
   for (const GlbBeside& glb : made) room -= static_cast<double>(glb.file.size());
   for (; room < 0 && !made.empty(); made.erase(made.begin())) {
     room += static_cast<double>(made.front().file.size());
     add_info(notes, "no-glb", "scale " + std::to_string(made.front().scale->scale),
-             "has no GLB: it would have too many bytes beside S_0's (scales.glb all writes it)");
+             "has no GLB: all would take over 2.2 times S_0's bytes and 32 kB (scales.glb all writes it)");
   }
 }
 

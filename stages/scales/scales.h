@@ -12,7 +12,7 @@
 namespace texmesh {
 
 inline constexpr int kScalesVersion = 10;
-inline constexpr int kGltfScalesVersion = 5;
+inline constexpr int kGltfScalesVersion = 6;
 
 enum class MeshCodec : std::uint8_t { kDraco, kMeshopt, kQuantized, kNone };
 template <>
@@ -64,7 +64,7 @@ struct ScalesOptions {
       "finer one is fetched anew");
     v("glb", s.glb,
       "scales that stand in GLBs beside the stream, for viewers of glTF; steps: the finest are left out where "
-      "all GLBs would take over 2.2 times the bytes of S_0's");
+      "all GLBs would take over 2.2 times the bytes of S_0's and 32 kB");
   }
 };
 
@@ -103,13 +103,14 @@ ScaleFiles write_scales(const NestedScales& scales, const PerceptualValues& perc
 ///   pixel at the switch size and of half a texel, and with normals of 7 to 9 bits; positions are finer where
 ///   over a tenth of the triangles would lose their area.
 /// - With ScaleGlbs::kSteps the finest are left out, with a note each, until all GLBs, S_0's and the coarsest
-///   among them, take at most kMostOverFinest times S_0's bytes.
+///   among them, take at most kMostOverFinest times S_0's bytes, and kAnywayBytes for the previews inside a
+///   small model's coarsest GLB.
 /// - A scale of the step function has textures that hold at its switch size: the least for which the quality
 ///   table says a FLIP of kGltfFlip (format/rules/whole_textures.h). Other scales have previews.
 /// - Textures are previews or JPEGs of planes, each once however many GLBs show it: "../preview/PPP.jpg" and
 ///   "PPP-rRR.jpg". An image with alpha is embedded, as in other GLBs.
 /// Same bytes for any thread count.
-inline constexpr double kGltfFlip = 0.08, kMostOverFinest = 2.2;
+inline constexpr double kGltfFlip = 0.08, kMostOverFinest = 2.2, kAnywayBytes = 32e3;
 GltfScales write_gltf_scales(const NestedScales& scales, const PerceptualValues& perceptual,
                              const std::vector<Material>& materials, const std::vector<Image>& images,
                              const Fragments& fragments, const std::vector<Pixels>& filled,

@@ -25,8 +25,9 @@ struct WeightedPredictor {
   Predictor predictor;
   double weight = 0;
 };
+using FurtherPredictors = std::vector<WeightedPredictor>;
 
-std::vector<WeightedPredictor> further_predictors(const ZimOptions& options) {
+FurtherPredictors further_predictors(const ZimOptions& options) {
   constexpr double kMostWeight = 100;  // as the other weights' range
   const auto refuse = [&] {
     std::string known;
@@ -49,7 +50,7 @@ std::vector<WeightedPredictor> further_predictors(const ZimOptions& options) {
       refuse();
   }
   if (options.weights.ends_with(',')) refuse();
-  std::vector<WeightedPredictor> list;
+  FurtherPredictors list;
   for (const auto& [name, predictor] : out) list.push_back(predictor);
   return list;
 }
@@ -64,11 +65,18 @@ void check_plane(const TexturePlane& plane, const Pixels& pixels, std::size_t p)
          std::to_string(pixels.width_px) + " x " + std::to_string(pixels.height_px));
 }
 
-void check(const Fragments& fragments, const std::vector<Pixels>& pixels, const ZimOptions& options) {
-  vqp_weight_sum(options);
+void check(const Fragments& fragments, const std::vector<Pixels>& pixels) {
   if (pixels.size() != fragments.planes.size())
     fail("pixels", std::to_string(fragments.planes.size()) + " planes", std::to_string(pixels.size()));
   for (std::size_t p = 0; p < pixels.size(); ++p) check_plane(fragments.planes[p], pixels[p], p);
+}
+
+double sum_of(const ZimOptions& options, const FurtherPredictors& further) {
+  double sum = options.weight_eta + options.weight_z + options.weight_i + options.weight_m;
+  for (const WeightedPredictor& p : further) sum += p.weight;
+  if (!(sum > 0))
+    fail("weight_eta", "> 0, or weight_z, weight_i, weight_m or one of weights > 0", std::to_string(sum));
+  return sum;
 }
 
 void predict_fragment(const TexelSums& sums, std::uint32_t channels, const ZimOptions& options, std::size_t f,
@@ -122,15 +130,15 @@ std::vector<float> predict_further(const FragmentReader& reader, Predictor predi
 
 /// (8.4)
 std::vector<float> visual_quality(const FragmentReader& reader, const PlanePredictors& predictors,
-                                  const ZimOptions& options, const RunContext& context) {
+                                  const ZimOptions& options, const FurtherPredictors& further, double sum,
+                                  const RunContext& context) {
   const TexturePlane& plane = reader.plane();
-  const double sum = vqp_weight_sum(options);
   std::vector<double> vqp(plane.fragment_count());
   add_spread(plane, plane.eta, options.weight_eta / sum, vqp);
   add_spread(plane, predictors.z, options.weight_z / sum, vqp);
   add_spread(plane, predictors.i, options.weight_i / sum, vqp);
   add_spread(plane, predictors.m, options.weight_m / sum, vqp);
-  for (const auto& [predictor, weight] : further_predictors(options))
+  for (const auto& [predictor, weight] : further)
     add_spread(plane, predict_further(reader, predictor, context), weight / sum, vqp);
   std::vector<float> out;
   for (const double value : vqp) out.push_back(static_cast<float>(std::min(value, 1.0)));
@@ -146,13 +154,7 @@ NamedPredictor::NamedPredictor(const std::string& name, Predictor predictor) {
     throw std::logic_error("the name of a predictor is taken or none: " + name);
 }
 
-double vqp_weight_sum(const ZimOptions& options) {
-  double sum = options.weight_eta + options.weight_z + options.weight_i + options.weight_m;
-  for (const WeightedPredictor& p : further_predictors(options)) sum += p.weight;
-  if (!(sum > 0))
-    fail("weight_eta", "> 0, or weight_z, weight_i, weight_m or one of weights > 0", std::to_string(sum));
-  return sum;
-}
+double vqp_weight_sum(const ZimOptions& options) { return sum_of(options, further_predictors(options)); }
 
 TexelSums FragmentReader::read(std::size_t fragment) const {
   const TexelRectangle at = fragment_rectangle(plane_, fragment);
@@ -202,10 +204,12 @@ void FragmentReader::add_pair(std::uint32_t x, std::uint32_t y, std::uint32_t u,
 
 Predictors predict_quality(const Fragments& fragments, const std::vector<Pixels>& pixels,
                            const ZimOptions& options, const RunContext& context) {
-  check(fragments, pixels, options);
+  const FurtherPredictors further = further_predictors(options);
+  const double sum = sum_of(options, further);
+  check(fragments, pixels);
   Predictors out;
   out.planes.resize(fragments.planes.size());
-  out.density_weight = options.weight_eta / vqp_weight_sum(options);
+  out.density_weight = options.weight_eta / sum;
   for (std::size_t p = 0; p < out.planes.size(); ++p) {
     const TexturePlane& plane = fragments.planes[p];
     PlanePredictors& predictors = out.planes[p];
@@ -220,7 +224,7 @@ Predictors predict_quality(const Fragments& fragments, const std::vector<Pixels>
              std::to_string(plane.covered_texels[f]) + " covered texels", std::to_string(sums.count));
       predict_fragment(sums, plane.channels, options, f, predictors);
     });
-    predictors.vqp = visual_quality(reader, predictors, options, context);
+    predictors.vqp = visual_quality(reader, predictors, options, further, sum, context);
     context.report(static_cast<double>(p + 1) / static_cast<double>(out.planes.size()));
   }
   return out;

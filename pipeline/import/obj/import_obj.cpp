@@ -438,22 +438,24 @@ std::vector<bool> find_tiled(const ObjData& data, const std::vector<LoadedLibrar
 }
 
 /// Faces of a material whose maps are named after tiles come to have one of each tile.
-void split_into_tiles(ObjData& data, const std::vector<bool>& tiled) {
+void split_into_tiles(ObjData& data, const std::vector<bool>& tiled, const std::string& file, Notes& notes) {
   if (std::find(tiled.begin(), tiled.end(), true) == tiled.end()) return;
   data.tiles.resize(data.materials.size());
   std::map<std::pair<std::uint16_t, std::uint16_t>, std::uint16_t> made;
+  std::size_t left_out = 0;
   for (std::size_t f = 0; f < data.faces.size(); ++f) {
     std::uint16_t& material = data.faces[f].material;
     if (material >= tiled.size() || !tiled[material]) continue;
     const std::uint16_t tile = tile_of(data, f);
     auto [it, is_new] = made.try_emplace({material, tile}, static_cast<std::uint16_t>(data.materials.size()));
-    if (is_new && data.materials.size() >= kMaxNames) it->second = material;
+    if (is_new && data.materials.size() >= kMaxNames) it->second = material, ++left_out;
     if (is_new && data.materials.size() < kMaxNames) {
       data.materials.push_back(data.materials[material]);
       data.tiles.push_back(tile);
     }
     material = it->second;
   }
+  warn_of_tiles(notes, file, made.size(), left_out);
 }
 
 Material make_material(const std::string& name, std::uint16_t tile,
@@ -485,7 +487,7 @@ void add_obj_materials(ObjData& data, const std::string& file, Model& model, Res
   for (const LoadedLibrary& library : libraries)
     for (const auto& [word, count] : library.file.unread)
       lost["statements " + quote(word) + " of materials"] += count;
-  split_into_tiles(data, find_tiled(data, libraries, resolver, options));
+  split_into_tiles(data, find_tiled(data, libraries, resolver, options), file, model.notes);
   std::vector<std::uint8_t> used(data.materials.size(), 0);
   for (const ObjFace& f : data.faces) used[f.material] = 1;
   for (std::size_t i = 0; i < data.materials.size(); ++i) {

@@ -6,6 +6,7 @@
 #include <algorithm>
 
 #include "format/documents/package_writer.h"
+#include "format/documents/thesis_tables.h"
 #include "format/rules/proxy_choice.h"
 #include "tests/format/container/package_fixture.h"
 
@@ -49,6 +50,26 @@ PackageReader open_package(Proxies proxies) {
   return PackageReader(open_container(memory_source(bytes)));
 }
 
+/// make_package() with perceptual values of S_0, S_4 and S_9, or of S_0 and S_9 alone.
+Bytes package_with_values(bool all) {
+  PackageReader package(open_container(memory_source(testing::make_package(1))));
+  std::vector<PackageEntry> entries;
+  for (const EntryRef& e : package.index())
+    if (e.path != kTexturesPath) entries.push_back({e.path, package.entry(e)});
+  ThesisTables values;
+  PerceptualTable& t = values.perceptual;
+  t.scale = {0, 4, 9}, t.triangles = {100, 96, 91}, t.collapses = {0, 2, 5};
+  t.average = t.largest = t.least = t.deviation = {0, 0.02f, 0.04f};
+  t.p95 = t.chain_average = t.chain_largest = t.chain_least = {0.02f, 0.05f, 0.04f};
+  if (!all) {
+    t.scale = {0, 9}, t.triangles = {100, 91}, t.collapses = {0, 7};
+    t.average = t.largest = t.least = t.deviation = {0, 0.05f};
+    t.p95 = t.chain_average = t.chain_largest = t.chain_least = {0.05f};
+  }
+  entries.push_back({kThesisPath, write_thesis(values)});
+  return write_package(package.manifest(), package.textures(), entries);
+}
+
 DeliveryRequest request(double displayed_px, double bytes_s, double limit_s = 5) {
   DeliveryRequest r;
   r.displayed_px = displayed_px;
@@ -66,6 +87,37 @@ TEST(DeliveryPlan, AThumbnailNeedsTheSmallestProxyAlone) {
   EXPECT_DOUBLE_EQ(plan.flip, 0.04);
   EXPECT_DOUBLE_EQ(plan.first_picture_s, plan.complete_s);
   EXPECT_EQ(plan_delivery(package, request(180, 1e6)).proxy, 1u);
+}
+
+TEST(DeliveryPlan, AnOwnJndTakesTheCoarsestScaleThatLooksAlike) {
+  const Bytes bytes = package_with_values(true);
+  PackageReader package(open_container(memory_source(bytes)));
+  const auto wanted = [&](double displayed_px, double jnd) {
+    DeliveryRequest r = request(displayed_px, 1e6);
+    r.jnd = jnd;
+    return wanted_scale(package, r);
+  };
+  EXPECT_EQ(wanted(300, 0), 4);
+  EXPECT_EQ(wanted(300, 0.03), 4);
+  EXPECT_EQ(wanted(300, 0.045), 9);
+  EXPECT_EQ(wanted(2000, 0.01), 0);
+  EXPECT_EQ(wanted(2000, 0.045), 4);
+  EXPECT_EQ(wanted(2000, 0.1), 9);
+}
+
+TEST(DeliveryPlan, AnOwnJndRefusesAPackageWhosePerceptualValuesDoNotKnowAScale) {
+  const Bytes bytes = package_with_values(false);
+  PackageReader package(open_container(memory_source(bytes)));
+  DeliveryRequest r = request(300, 1e6);
+  EXPECT_EQ(wanted_scale(package, r), 4);  // nothing asks for the values
+  r.jnd = 0.1;
+  try {
+    wanted_scale(package, r);
+    FAIL() << "a scale was chosen without values";
+  } catch (const FormatError& e) {
+    EXPECT_NE(std::string(e.what()).find("expected scale 4, found none [R16]"), std::string::npos)
+        << e.what();
+  }
 }
 
 TEST(DeliveryPlan, AScaleOrAnotherRuleIsAskedForByHand) {

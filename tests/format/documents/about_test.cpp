@@ -115,6 +115,16 @@ TEST(AboutDocument, MergeIsByFieldAndALicenceBringsItsOwnPage) {
   EXPECT_EQ(merge_about({}, full_about()), full_about());
 }
 
+TEST(AboutDocument, ThePageOfAnotherCreatorGoes) {
+  About under, over;
+  under.creator = "A", under.identifiers = {{"doi", "10.1/2"}, {"creator", "https://a.example"}};
+  over.creator = "B";
+  EXPECT_EQ(creator_url(merge_about(under, {})), "https://a.example");
+  EXPECT_EQ(merge_about(under, over).identifiers, (std::vector<NamedText>{{"doi", "10.1/2"}}));
+  over.identifiers = {{"creator", "not an address"}};
+  EXPECT_EQ(creator_url(merge_about(under, over)), "");
+}
+
 TEST(AboutDocument, CopyrightLineNamesTheLicenceOnce) {
   EXPECT_EQ(copyright_line({}), "");
   EXPECT_EQ(copyright_line(full_about()), "Museum of Casts. Licence: CC-BY-4.0");

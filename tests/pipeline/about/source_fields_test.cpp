@@ -57,6 +57,23 @@ TEST(SourceFields, ValuesThatMakeNoSenseCostANoteAndNothingElse) {
   EXPECT_EQ(notes[0].severity, Severity::kInfo);
 }
 
+TEST(SourceFields, AnAuthorWithAnAddressIsACreatorWithAPage) {
+  const auto said = [](const std::string& value) {
+    Notes notes;
+    About a;
+    a.identifiers = {{"doi", "10.1/2"}, {"creator", "https://other.example"}};
+    EXPECT_TRUE(set_source_field(a, "author", value, "/asset/extras", notes));
+    EXPECT_EQ(a.identifiers[0].text, "10.1/2");
+    return std::pair(a.creator, creator_url(a));
+  };
+  using Said = std::pair<std::string, std::string>;
+  EXPECT_EQ(said("N. N. (https://sketchfab.com/nn)"), (Said{"N. N.", "https://sketchfab.com/nn"}));
+  EXPECT_EQ(said("N. (Museum) (http://a.example/b?c=(d))"), (Said{"N. (Museum)", "http://a.example/b?c=(d)"}));
+  for (const std::string text : {"N. N.", "N. N. (Museum)", "N. N. (javascript:alert(1))", "(https://a.example)",
+                                 "N. N. https://a.example", "N. N. (https://a.example) and others"})
+    EXPECT_EQ(said(text), (Said{text, ""}));
+}
+
 TEST(SourceFields, StrangersTextsAreMadeFitToShow) {
   EXPECT_EQ(clean_about_text(" \ta\nb \x1b[31m\xff ", 100), "a b ?[31m?");
   EXPECT_EQ(clean_about_text("\xc3\xa4\xc3\xa4", 3), "\xc3\xa4");

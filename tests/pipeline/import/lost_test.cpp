@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "pipeline/import/foreign_file.h"
+#include "pipeline/import/udim.h"
 #include "stages/image/decode_image.h"
 #include "tests/pipeline/import/gltf/textured_gltf.h"
 #include "tests/pipeline/import/obj/obj_cases.h"
@@ -209,6 +210,56 @@ TEST(Obj, UdimTilesAreMaterials) {
   EXPECT_EQ(width_of(0), 8u);
   EXPECT_EQ(width_of(1), 4u);
   EXPECT_EQ(width_of(2), 2u);
+}
+
+const Note* note_of(const Notes& notes, const std::string& code) {
+  const auto at = std::ranges::find(notes, code, &Note::code);
+  return at == notes.end() ? nullptr : &*at;
+}
+
+TEST(Obj, MoreTilesThanMaterialsAreTold) {
+  MemoryResolver files;
+  files.files["a.mtl"] = bytes_of("newmtl m\nmap_Kd skin.<UDIM>.png\n");
+  std::string text = "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt .5 .5\nvt 1.5 .5\nvt 2.5 .5\n";
+  for (int k = 0; k < 65'532; ++k) text += "usemtl " + std::to_string(k) + "\nf 1/1 2/1 3/1\n";
+  text += "usemtl m\n";
+  const ImportedModel fits = import("t.obj", bytes_of(text + "f 1/1 2/1 3/1\n"), files);
+  EXPECT_FALSE(note_of(fits.model.notes, "too-many-tiles"));
+  const ImportedModel m =
+      import("t.obj", bytes_of(text + "f 1/1 2/1 3/1\nf 1/2 2/2 3/2\nf 1/3 2/3 3/3\n"), files);
+  const Note* told = note_of(m.model.notes, "too-many-tiles");
+  ASSERT_TRUE(told);
+  EXPECT_EQ(told->severity, Severity::kWarning);
+  EXPECT_EQ(
+      told->text,
+      "faces lie in 3 UDIM tiles, and a model has at most 65535 materials: 2 tiles are shown without their own "
+      "pictures. Join pictures, or compile parts of the model");
+}
+
+TEST(TiledImages, MoreTilesThanMaterialsAreTold) {
+  MemoryResolver files;
+  files.files["skin.1001.png"] = testing::png_bytes(8, 8, 3);
+  Model model;
+  TiledImages tiled;
+  Material material;
+  material.base_colour_texture.image =
+      tiled.add_image(model, {"skin.<UDIM>.png", "", false}, files, "m.gltf", "/images/0", {});
+  model.materials.assign(65'533, {});
+  model.materials.push_back(material);
+  Mesh& mesh = model.mesh;
+  for (const float u : {0.5f, 1.5f, 2.5f}) {
+    const auto at = static_cast<std::uint32_t>(mesh.uv0.size());
+    mesh.uv0.resize(at + 3, {u, 0.5f});
+    mesh.triangles.push_back({at, at + 1, at + 2});
+    mesh.triangle_material.push_back(65'533);
+  }
+  tiled.split(model, files, "m.gltf", {});
+  EXPECT_EQ(model.materials.size(), 65'535u);
+  EXPECT_EQ(mesh.triangle_material, (std::vector<std::uint16_t>{65'533, 65'534, 65'533}));
+  const Note* told = note_of(model.notes, "too-many-tiles");
+  ASSERT_TRUE(told);
+  EXPECT_NE(told->text.find("faces lie in 3 UDIM tiles"), std::string::npos);
+  EXPECT_NE(told->text.find(": 1 tiles"), std::string::npos);
 }
 
 TEST(SourceText, EncodingsOfEveryTextFormat) {

@@ -89,6 +89,8 @@ std::string package_title(PackageReader& package) {
 
 std::string rights_line(const About& about) {
   std::string out = markup_escaped(about.attribution.empty() ? about.creator : about.attribution);
+  if (const std::string page = creator_url(about); about.attribution.empty() && !page.empty())
+    out = fmt::format("<a href=\"{}\">{}</a>", markup_escaped(page), out);
   if (!about.licence.empty()) {
     const std::string licence = markup_escaped(about.licence);
     if (!out.empty()) out += ", ";

@@ -208,12 +208,14 @@ OrderedJson schema_org(const SiteObject& o, const SiteOptions& options) {
   };
   add("description", a.description, !a.description.empty());
   add("creator", {{"@type", "Person"}, {"name", a.creator}}, !a.creator.empty());
+  if (const std::string page = creator_url(a); !page.empty()) json["creator"]["url"] = page;
   add("creditText", a.attribution, !a.attribution.empty());
   add("license", a.licence_url.empty() ? a.licence : a.licence_url,
       !a.licence.empty() || !a.licence_url.empty());
   add("isBasedOn", a.source_url, !a.source_url.empty());
   for (const NamedText& i : a.identifiers)
-    json["identifier"].push_back({{"@type", "PropertyValue"}, {"propertyID", i.name}, {"value", i.text}});
+    if (i.name != kCreatorScheme)
+      json["identifier"].push_back({{"@type", "PropertyValue"}, {"propertyID", i.name}, {"value", i.text}});
   if (options.url.empty()) return json;
   json["url"] = page_address(o, options);
   if (!o.poster.empty()) json["image"] = options.url + o.poster_address;

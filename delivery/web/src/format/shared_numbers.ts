@@ -69,6 +69,26 @@ export const splitLefts = 12;
 export const splitRuns = 7;
 export const splitRings = 8;
 export const splitValences = 5;
+/** Daylight in viewers and posters: radiance that paper mirrors from right above and from right below. */
+export const paperAbove = [
+  0.955, 0.955, 0.955,
+];
+export const paperBelow = [
+  0.653, 0.627, 0.577,
+];
+/**
+ * Mirrors see a sky with more contrast: from this radiance so much brighter between two heights of the
+ * direction, the lower one and what it is to the higher one.
+ */
+export const mirrorLow = 0.3;
+export const mirrorRise = 1.4;
+export const mirrorFrom = -0.6;
+export const mirrorWidth = 1.5;
+/** Where the lamp is that the camera carries, along its axes, and how bright. */
+export const lampPlace = [
+  -0.5, 0.7, 1,
+];
+export const lampIntensity = 2.2;
 export const pi = 3.141592653589793;
 export const ln2 = 0.6931471805599453;
 export const ln2Hi = 0.6931471803691238;

@@ -1,5 +1,6 @@
-import { DirectionalLight, HemisphereLight } from 'three';
+import { Color, DirectionalLight, HemisphereLight } from 'three';
 import type { Object3D, Scene } from 'three';
+import { lampIntensity, lampPlace, paperAbove, paperBelow } from '../format/shared_numbers';
 
 /**
  * Adds daylight from above and a lamp that the camera is to carry; gives the lamp, whose place is the
@@ -7,9 +8,10 @@ import type { Object3D, Scene } from 'three';
  * (stages/render: daylight_environment).
  */
 export function daylight(scene: Scene): DirectionalLight {
-  const lamp = new DirectionalLight(0xffffff, 2.2);
-  lamp.position.set(-0.5, 0.7, 1);
-  scene.add(new HemisphereLight(0xffffff, 0xd8d4cc, 3), lamp, lamp.target);
+  const lamp = new DirectionalLight(0xffffff, lampIntensity);
+  lamp.position.fromArray(lampPlace);
+  const [above, below] = [paperAbove, paperBelow].map((paper) => new Color().fromArray(paper));
+  scene.add(new HemisphereLight(above, below, Math.PI), lamp, lamp.target);
   return lamp;
 }
 

@@ -1,4 +1,7 @@
 import { CubeUVReflectionMapping, DataTexture, HemisphereLight, type Scene, ShaderChunk } from 'three';
+import {
+  mirrorFrom, mirrorLow, mirrorRise, mirrorWidth, paperAbove, paperBelow,
+} from '../format/shared_numbers';
 
 /**
  * Radiance of the sky by height of the direction and by roughness, in linear light. Rough surfaces see the
@@ -7,8 +10,8 @@ import { CubeUVReflectionMapping, DataTexture, HemisphereLight, type Scene, Shad
  */
 const kSky = `
 vec3 sky(float up,float roughness){
-return mix(vec3(mix(.3,1.7,smoothstep(-.6,.9,up))),
-mix(vec3(.653,.627,.577),vec3(.955),.5+.5*up),roughness);}
+return mix(vec3(${mirrorLow}+${mirrorRise}*smoothstep(${mirrorFrom},${mirrorFrom + mirrorWidth},up)),
+mix(vec3(${paperBelow}),vec3(${paperAbove}),.5+.5*up),roughness);}
 `;
 const kLookUp = /textureCubeUV\( envMap, .+? \* (\w+), (.+?) \)/g;
 

@@ -58,7 +58,8 @@ TEST(Archive, SketchfabsDownloadBringsItsLicence) {
   EXPECT_EQ(m.model.mesh.triangles.size(), 1u);
   EXPECT_EQ(m.format, "gltf");
   EXPECT_EQ(m.about.title, "Old bust");
-  EXPECT_EQ(m.about.creator.substr(0, 5), "N. N.");
+  EXPECT_EQ(m.about.creator, "N. N.");
+  EXPECT_EQ(creator_url(m.about), "https://sketchfab.com/nn");
   EXPECT_EQ(m.about.licence, "CC-BY-4.0");
   EXPECT_TRUE(has(m.about.licence_url, "creativecommons.org"));
   EXPECT_EQ(m.about.source_url, "https://sketchfab.com/3d-models/old-bust-1");

@@ -32,6 +32,17 @@ TEST(Filled, NeverLooksIntoAValue) { EXPECT_EQ(filled("{{x}}", {{"x", "{{y}}{{x}
 
 TEST(Filled, ANameWithoutAValueIsAMistakeOfOurs) { EXPECT_THROW(filled("{{z}}", {}), std::logic_error); }
 
+TEST(RightsLine, LinksTheCreatorsPageWhereNoOtherLineIsAskedFor) {
+  About about;
+  about.creator = "N. <N.>", about.identifiers = {{"creator", "https://a.example/?n&m"}};
+  EXPECT_EQ(rights_line(about),
+            "<p class=\"quiet\"><a href=\"https://a.example/?n&amp;m\">N. &lt;N.&gt;</a></p>\n");
+  about.identifiers[0].text = "javascript:alert(1)";
+  EXPECT_EQ(rights_line(about), "<p class=\"quiet\">N. &lt;N.&gt;</p>\n");
+  about.identifiers[0].text = "https://a.example", about.attribution = "by N.";
+  EXPECT_EQ(rights_line(about), "<p class=\"quiet\">by N.</p>\n");
+}
+
 TEST(ReadableTitle, IsWhatPeopleWouldWrite) {
   EXPECT_EQ(readable_title("packages/apple_food-01.texmesh"), "Apple food 01");
   EXPECT_EQ(readable_title("a/Schildkr\xc3\xb6te gro\xc3\x9f.texmesh/"), "Schildkr\xc3\xb6te gro\xc3\x9f");
