@@ -153,4 +153,26 @@ std::int32_t add_image(Model& model, const NameInModel& name, Resolver& resolver
   return -1;
 }
 
+std::int32_t add_image_of_stem(Model& model, const std::string& stem, Resolver& resolver,
+                               const std::string& file_name, const std::string& place,
+                               const ImportOptions& options) {
+  Notes of_the_ending;
+  NamedFile file = find_file({stem + ".jpg", "", false}, resolver,
+                             static_cast<std::uint64_t>(options.max_file_bytes), of_the_ending, place);
+  return file.bytes ? add_image_bytes(model, file.name, std::move(*file.bytes), file_name, place, options)
+                    : -1;
+}
+
+std::int32_t add_unnamed_texture(Model& model, Resolver& resolver, const std::string& file_name,
+                                 const std::string& place, const ImportOptions& options) {
+  const std::int32_t image = add_image_of_stem(model, file_name.substr(0, file_name.rfind('.')), resolver,
+                                               file_name, place, options);
+  if (image >= 0)
+    add_warning(model.notes, "unnamed-texture", place,
+                "the model has texture coordinates and names no texture; " +
+                    quote(model.images[static_cast<std::size_t>(image)].name) +
+                    ", which is named after the model, is taken");
+  return image;
+}
+
 }  // namespace texmesh

@@ -35,6 +35,7 @@ std::vector<std::string> readings_of(const NameInModel& name) {
   for (const char* mark : {" #", "\t#"})
     if (const std::size_t at = name.text.find(mark); at != std::string::npos)
       add(std::string(without_quotes(std::string_view(name.text).substr(0, at))));
+  add(percent_decoded(without_quotes(name.text)));
   return readings;
 }
 
@@ -85,9 +86,12 @@ class Finder {
              " is no name within the model's folder and is not followed; " + quote(name) + " is taken");
         return std::move(found_);
       }
-    if (const auto similar = only_similar(); similar && read(*similar)) {
-      warn("similar-name", " is not there; " + quote(*similar) +
-                               ", which differs in the case of letters or their composition only, is taken");
+    if (const auto similar = only_similar(); similar && read(similar->name)) {
+      const char* what = similar->of_one_key
+                             ? ", which differs in the case of letters or their composition only,"
+                             : ", a picture with another ending,";
+      warn(similar->of_one_key ? "similar-name" : "other-ending",
+           " is not there; " + quote(similar->name) + what + " is taken");
       return std::move(found_);
     }
     if (found_.looked_for.empty()) found_.looked_for = "it names no file beneath the model's folder";
@@ -123,12 +127,18 @@ class Finder {
     return found_.bytes.has_value();
   }
 
-  std::optional<std::string> only_similar() {
-    std::vector<std::string> similar;
+  struct Similar {
+    std::string name;
+    bool of_one_key;  // with a name that was looked for
+  };
+  std::optional<Similar> only_similar() {
+    std::vector<std::string> of_one_key, others;
     for (const auto* names : {&inside_, &beside_})
       for (const std::string& name : *names)
-        for (std::string& other : resolver_.similar(name)) add(similar, std::move(other));
-    if (similar.size() == 1) return similar[0];
+        for (const std::string& other : resolver_.similar(name))
+          add(name_key(other) == name_key(name) ? of_one_key : others, other);
+    const std::vector<std::string>& similar = of_one_key.empty() ? others : of_one_key;
+    if (similar.size() == 1) return Similar{similar[0], !of_one_key.empty()};
     for (const std::string& name : similar)
       found_.looked_for += (&name == &similar[0] ? "; any of these may be meant: " : ", ") + quote(name);
     return std::nullopt;

@@ -257,9 +257,10 @@ Bytes read_input_file(const std::filesystem::path& path, std::uint64_t max_bytes
   if (fd.get() < 0 && errno == ENOENT) {
     const std::filesystem::path folder = path.parent_path();
     const SimilarNames similar = similar_names(folder.string(), path.filename().string());
-    if (!similar.names.empty())
-      throw InputError(name, "", "a readable file",
-                       "only " + similar.names[0] + ", whose name differs in case or composition");
+    for (const std::string& other : similar.names)
+      if (name_key(other) == name_key(path.filename().string()))
+        throw InputError(name, "", "a readable file",
+                         "only " + other + ", whose name differs in case or composition");
     errno = ENOENT;
   }
   if (fd.get() < 0) fail_to_read(name, "", errno);

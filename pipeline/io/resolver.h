@@ -17,7 +17,7 @@ class Resolver {
   /// (absolute, drive letter, scheme, "..", a symbolic link that leads elsewhere, not a regular file), and
   /// InputError when the file exceeds max_bytes.
   virtual std::optional<Bytes> read(const std::string& uri, std::uint64_t max_bytes) = 0;
-  /// Files whose names differ from `uri` only in case or composition (name_key()), sorted.
+  /// Files of other names that may be meant by `uri` (similar_key()), sorted.
   virtual std::vector<std::string> similar(const std::string&) { return {}; }
 };
 
@@ -40,7 +40,7 @@ class MemoryFiles : public Resolver {
   std::vector<std::string> similar(const std::string& uri) override {
     std::vector<std::string> names;
     for (const auto& [name, bytes] : files)
-      if (name != uri && name_key(name) == name_key(uri)) names.push_back(name);
+      if (name != uri && similar_key(name) == similar_key(uri)) names.push_back(name);
     return names;
   }
 };

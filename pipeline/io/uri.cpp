@@ -252,6 +252,16 @@ std::string name_key(std::string_view name) {
   return bytes < 0 ? text : std::string(reinterpret_cast<const char*>(key), static_cast<std::size_t>(bytes));
 }
 
+std::string similar_key(std::string_view name) {
+  static constexpr std::string_view kPictures[] = {".jpg", ".jpeg", ".png", ".webp", ".avif",
+                                                   ".tif", ".tiff", ".bmp", ".tga",  ".gif",
+                                                   ".exr", ".hdr",  ".dds", ".jp2",  ".ktx2"};
+  const std::string ending = lower_ending(name);
+  const bool is_picture =
+      std::find(std::begin(kPictures), std::end(kPictures), ending) != std::end(kPictures);
+  return is_picture ? name_key(name.substr(0, name.size() - ending.size())) + ".*" : name_key(name);
+}
+
 std::string lower_ending(std::string_view path) {
   path.remove_prefix(path.rfind('/') + 1);
   const std::size_t dot = path.rfind('.');

@@ -61,6 +61,9 @@ void append_utf8(std::string& text, char32_t character);
 /// Equal for names that differ only in the case of letters, in how Unicode composes them (NFC, NFD), or in
 /// being written in Windows-1252 instead of UTF-8.
 std::string name_key(std::string_view name);
+/// Equal for names of one name_key(), and for those that differ besides in the ending of a picture: "T.tif"
+/// and "t.png".
+std::string similar_key(std::string_view name);
 /// UTF-8 that from_wire() gives the same bytes for.
 std::string to_wire(std::string_view bytes);
 std::string from_wire(std::string_view text);

@@ -272,12 +272,16 @@ std::optional<Bytes> ArchiveFiles::read(const std::string& uri, std::uint64_t ma
 
 std::vector<std::string> ArchiveFiles::similar(const std::string& uri) {
   std::vector<std::string> out;
-  const std::string key = name_key(uri);
-  for (const ArchivedFile& f : files_)
-    if (f.name.starts_with(folder_) && f.name != folder_ + uri &&
-        name_key(f.name.substr(folder_.size())) == key)
+  const std::string key = similar_key(uri), key_of_last = similar_key(archived_name(uri));
+  for (const ArchivedFile& f : files_) {
+    const bool is_below = f.name.starts_with(folder_) && f.name != folder_ + uri;
+    if (is_below && similar_key(f.name.substr(folder_.size())) == key)
       out.push_back(f.name.substr(folder_.size()));
+    else if (similar_key(archived_name(f.name)) == key_of_last)
+      out.push_back(archived_name(f.name));
+  }
   std::ranges::sort(out);
+  out.erase(std::ranges::unique(out).begin(), out.end());
   return out;
 }
 

@@ -368,8 +368,11 @@ FoundMaterial find_material(const std::vector<LoadedLibrary>& libraries, const s
 
 class LibraryLoader {
  public:
-  LibraryLoader(Model& model, Resolver& resolver, const ImportOptions& options)
-      : model_(model), resolver_(resolver), max_bytes_(static_cast<std::uint64_t>(options.max_file_bytes)) {}
+  LibraryLoader(const std::string& file, Model& model, Resolver& resolver, const ImportOptions& options)
+      : own_name_(file.substr(0, file.rfind('.')) + ".mtl"),
+        model_(model),
+        resolver_(resolver),
+        max_bytes_(static_cast<std::uint64_t>(options.max_file_bytes)) {}
 
   /// `mtllib a.mtl b.mtl` names two files, `mtllib my scan.mtl` one: the whole is tried first.
   void load(const ObjData::Library& library) {
@@ -397,13 +400,19 @@ class LibraryLoader {
     loaded_.emplace_back(found.name, read_mtl(found.name, *found.bytes, model_.notes));
     return "";
   }
+  /// Who renames a model and its library forgets the line that names it.
   void missing(const std::string& name, const std::string& looked_for) {
-    if (!looked_for.empty())
-      add_warning(model_.notes, "missing-mtl", place_,
-                  "material library " + quote(name) + " not found: " + looked_for +
-                      "; its materials stay untextured");
+    if (looked_for.empty()) return;
+    if (loaded_.empty() && load_one(own_name_).empty())
+      return add_warning(model_.notes, "renamed-mtl", place_,
+                         "material library " + quote(name) + " is not there; " + quote(loaded_[0].name) +
+                             ", which is named after the model, is taken");
+    add_warning(
+        model_.notes, "missing-mtl", place_,
+        "material library " + quote(name) + " not found: " + looked_for + "; its materials stay untextured");
   }
 
+  const std::string own_name_;  // of a library that is named after the model
   Model& model_;
   Resolver& resolver_;
   const std::uint64_t max_bytes_;
@@ -477,7 +486,7 @@ Material make_material(const std::string& name, std::uint16_t tile,
 /// names. What is missing gives a warning and a material without texture.
 void add_obj_materials(ObjData& data, const std::string& file, Model& model, Resolver& resolver,
                        const ImportOptions& options, Lost& lost) {
-  LibraryLoader loader(model, resolver, options);
+  LibraryLoader loader(file, model, resolver, options);
   for (const ObjData::Library& library : data.libraries) {
     const auto same = [&library](const ObjData::Library& other) { return other.name == library.name; };
     const auto first = std::find_if(data.libraries.begin(), data.libraries.end(), same);
@@ -499,6 +508,10 @@ void add_obj_materials(ObjData& data, const std::string& file, Model& model, Res
     const MtlMaterial* material = find_material(libraries, data.materials[i]).material;
     if (named && material && !material->norm && material->bump) data.with_bump_map.push_back(i);
   }
+  const auto only = std::find(used.begin(), used.end(), 1);
+  if (libraries.empty() && !data.uvs.empty() && data.colours.empty() && std::count(only, used.end(), 1) == 1)
+    model.materials[static_cast<std::size_t>(only - used.begin())].base_colour_texture.image =
+        add_unnamed_texture(model, resolver, file, "", options);
 }
 
 // The mesh.

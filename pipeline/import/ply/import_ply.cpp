@@ -412,6 +412,7 @@ class PlyModel {
 
  private:
   bool has_uv() const { return !surface_.vertices.uv.empty() || !surface_.faces.uv.empty(); }
+  bool has_colours() const { return !surface_.vertices.colours.empty() || !surface_.faces.colours.empty(); }
 
   // Material 0 is untextured; one more for each TextureFile.
   void add_materials() {
@@ -432,9 +433,16 @@ class PlyModel {
       model_.materials.push_back(std::move(material));
     }
     if (model_.materials.size() == 1) add_artec_materials(plain);
+    if (model_.materials.size() == 1 && has_uv() && !has_colours()) add_material_of_stem(plain);
     if (model_.materials.size() > 1 && !has_uv())
       add_warning(model_.notes, "texture-without-uv", "header",
                   "a TextureFile is named but there are no texture coordinates");
+  }
+
+  void add_material_of_stem(Material material) {
+    material.name = file_.substr(0, file_.rfind('.'));
+    material.base_colour_texture.image = add_unnamed_texture(model_, resolver_, file_, "header", options_);
+    if (material.base_colour_texture.used()) model_.materials.push_back(std::move(material));
   }
 
   /// Artec Studio names the pictures after the model. A model that was renamed has often got a longer name:
@@ -459,19 +467,14 @@ class PlyModel {
   }
 
   std::int32_t artec_image(const std::string& name, std::string& looked_for) {
-    static constexpr std::string_view kEndings[] = {".jpg", ".png", ".bmp", ".tif", ".jpeg"};
-    for (const std::string_view ending : kEndings) {
-      Notes notes;
-      NamedFile file = find_file({name + std::string(ending), "", false}, resolver_,
-                                 static_cast<std::uint64_t>(options_.max_file_bytes), notes, kArtecPlace);
-      if (!file.bytes) continue;
-      model_.notes.insert(model_.notes.end(), notes.begin(), notes.end());
+    const std::int32_t image = add_image_of_stem(model_, name, resolver_, file_, kArtecPlace, options_);
+    if (image >= 0)
       add_info(model_.notes, "texture-by-name", kArtecPlace,
-               "no comment names the textures; " + quote(file.name) + " is taken by its name");
-      return add_image_bytes(model_, file.name, std::move(*file.bytes), file_, kArtecPlace, options_);
-    }
-    looked_for += (looked_for.empty() ? "" : ", ") + quote(name + ".jpg") + " (.png, .bmp, .tif, .jpeg)";
-    return -1;
+               "no comment names the textures; " +
+                   quote(model_.images[static_cast<std::size_t>(image)].name) + " is taken by its name");
+    else
+      looked_for += (looked_for.empty() ? "" : ", ") + quote(name + ".jpg") + " or with another ending";
+    return image;
   }
   static constexpr const char* kArtecPlace = "element multi_texture_face";
 
@@ -491,7 +494,7 @@ class PlyModel {
     bool all_textured = true;
     for (std::size_t f = 0; f < surface_.faces.count() && all_textured; ++f)
       all_textured = textured(material_of(f));
-    const bool any_colours = !surface_.vertices.colours.empty() || !surface_.faces.colours.empty();
+    const bool any_colours = has_colours();
     if (any_colours && all_textured)
       add_info(model_.notes, "colours-beside-texture", "",
                "vertex or face colours are left out where a texture shows");

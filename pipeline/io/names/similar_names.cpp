@@ -53,14 +53,14 @@ class Search {
     Descriptor own(::openat(folder, ".", kFolder));
     if (own.get() < 0 || ::fstat(own.get(), &s) != 0) return like;
     found_.folder = listed_++ == 0 ? stamp_of(s) : FileStamp{};
-    const std::string key = name_key(part);
+    const std::string key = similar_key(part);
     const std::unique_ptr<DIR, int (*)(DIR*)> listing(::fdopendir(own.get()), ::closedir);
     if (!listing) return like;
     own.release();
     for (std::size_t n = 0; n < kMostEntries; ++n) {
       const dirent* entry = ::readdir(listing.get());
       if (entry == nullptr) break;
-      if (entry->d_name != part && name_key(entry->d_name) == key) like.emplace_back(entry->d_name);
+      if (entry->d_name != part && similar_key(entry->d_name) == key) like.emplace_back(entry->d_name);
     }
     std::sort(like.begin(), like.end());
     if (like.size() > kMostSimilar) like.resize(kMostSimilar);

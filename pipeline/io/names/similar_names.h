@@ -6,7 +6,7 @@
 
 namespace texmesh {
 
-/// What lies beneath a folder under a name, or under one with the same name_key().
+/// What lies beneath a folder under a name, or under one with the same similar_key().
 struct SimilarNames {
   std::vector<std::string> names;  // relative to the folder, sorted; the name itself is not among them
   /// Of the folder that was listed. While it stays as it is, so does the answer; zero where the answer hangs
