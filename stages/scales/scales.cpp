@@ -541,9 +541,8 @@ Bytes code_beside(const ScaleCoding& coding, const GlbBeside& glb, const std::ve
 
 /// The finest go until all GLBs together take no more than kMostOverFinest of S_0's and kAnywayBytes.
 void leave_out_finest(const ScaleFiles& files, std::vector<GlbBeside>& made, Notes& notes) {
-  const auto finest = static_cast<double>(files.files.front().glb.size());
-  double room = (kMostOverFinest - 1) * finest + kAnywayBytes;
-  room -= static_cast<double>(files.files.back().glb.size());
+  double room = (kMostOverFinest - 1) * static_cast<double>(files.files.front().glb.size()) + kAnywayBytes -
+                static_cast<double>(files.files.back().glb.size());
   for (const GlbBeside& glb : made) room -= static_cast<double>(glb.file.size());
   for (; room < 0 && !made.empty(); made.erase(made.begin())) {
     room += static_cast<double>(made.front().file.size());

@@ -68,9 +68,11 @@ TEST(SourceFields, AnAuthorWithAnAddressIsACreatorWithAPage) {
   };
   using Said = std::pair<std::string, std::string>;
   EXPECT_EQ(said("N. N. (https://sketchfab.com/nn)"), (Said{"N. N.", "https://sketchfab.com/nn"}));
-  EXPECT_EQ(said("N. (Museum) (http://a.example/b?c=(d))"), (Said{"N. (Museum)", "http://a.example/b?c=(d)"}));
-  for (const std::string text : {"N. N.", "N. N. (Museum)", "N. N. (javascript:alert(1))", "(https://a.example)",
-                                 "N. N. https://a.example", "N. N. (https://a.example) and others"})
+  EXPECT_EQ(said("N. (Museum) (http://a.example/b?c=(d))"),
+            (Said{"N. (Museum)", "http://a.example/b?c=(d)"}));
+  for (const std::string text :
+       {"N. N.", "N. N. (Museum)", "N. N. (javascript:alert(1))", "(https://a.example)",
+        "N. N. https://a.example", "N. N. (https://a.example) and others"})
     EXPECT_EQ(said(text), (Said{text, ""}));
 }
 
