@@ -206,7 +206,7 @@ void JobSelection::select(std::vector<WorkerReport>& reports) {
 }
 
 void JobSelection::recall(const PackageMemo& memo, WorkerReport& r) {
-  has_recalled_failure_ = has_recalled_failure_ || memo.failed;
+  recalled_failures_ += memo.failed;
   r.result = memo.failed ? ModelResult::kFailed : ModelResult::kUnchanged;
   r.bytes = memo.package_bytes;
   if (!memo.failed) r.made_s = memo.seconds, r.made_memory_bytes = memo.peak_memory_bytes;

@@ -64,8 +64,8 @@ class JobSelection {
   const std::vector<WorkerJob>& jobs() const { return jobs_; }
   /// The job's index in the plan; it rises with the job's number.
   std::size_t model_of(std::size_t job) const { return model_of_job_[job]; }
-  /// A model that need not run failed in an earlier run.
-  bool has_recalled_failure() const { return has_recalled_failure_; }
+  /// Models that need not run and failed in an earlier run.
+  std::size_t recalled_failures() const { return recalled_failures_; }
 
   void remember(std::size_t job, const WorkerReport& report);
   /// What the model took when its stages ran, for the report of a job that found most of them in the cache.
@@ -89,7 +89,7 @@ class JobSelection {
   std::vector<std::size_t> model_of_job_;
   std::map<std::pair<const std::string*, std::vector<std::string>>, Sha256> requests_;
   std::string tool_seed_;
-  bool has_recalled_failure_ = false;
+  std::size_t recalled_failures_ = 0;
 };
 
 }  // namespace texmesh

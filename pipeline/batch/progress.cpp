@@ -277,13 +277,14 @@ void Progress::summary(const std::vector<WorkerReport>& reports, double seconds,
   out_ << std::flush;
 }
 
-void Progress::forecast_summary(std::size_t to_look_at, std::size_t models,
+void Progress::forecast_summary(std::size_t to_look_at, std::size_t models, std::size_t failed,
                                 const std::vector<std::string>& stale) {
   if (mode_ == OutputMode::kJson || mode_ == OutputMode::kQuiet) return;
-  if (to_look_at == 0)
-    line(recalled_text(static_cast<std::ptrdiff_t>(models), models) + ". Nothing was written.");
-  else
-    line(fmt::format("{} would run, {} up to date. Nothing was written.", to_look_at, models - to_look_at));
+  const std::size_t same = models - to_look_at - failed;
+  const std::string counts = to_look_at == 0 && failed == 0
+                                 ? recalled_text(static_cast<std::ptrdiff_t>(models), models)
+                                 : fmt::format("{} would run, {} up to date", to_look_at, same);
+  line(counts + (failed > 0 ? fmt::format(", {} failed before", failed) : "") + ". Nothing was written.");
   tell_stale(stale, "no model makes this package any more");
 }
 

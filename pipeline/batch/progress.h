@@ -33,7 +33,9 @@ class Progress {
   /// `stale`: packages that no model makes any more, paths within the output folder.
   void summary(const std::vector<WorkerReport>& reports, double seconds,
                const std::vector<std::string>& stale, bool removed);
-  void forecast_summary(std::size_t to_look_at, std::size_t models, const std::vector<std::string>& stale);
+  /// `failed`: of the models that would not run.
+  void forecast_summary(std::size_t to_look_at, std::size_t models, std::size_t failed,
+                        const std::vector<std::string>& stale);
   /// A forecast has told all of the model's stages.
   void foreseen(std::size_t model);
 

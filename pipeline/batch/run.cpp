@@ -115,7 +115,7 @@ class Batch {
         saved = Clock::now();
       }
     };
-    const bool stop = settings_.pool.stop_on_failure && selection_.has_recalled_failure();
+    const bool stop = settings_.pool.stop_on_failure && selection_.recalled_failures() > 0;
     std::vector<WorkerReport> reports(selection_.jobs().size());
     for (WorkerReport& r : reports) r.result = ModelResult::kCancelled;
     if (!stop) reports = run_workers(selection_.jobs(), settings_.pool, on_event, on_finish);
@@ -137,7 +137,8 @@ class Batch {
     const auto on_event = [&](std::size_t job, WorkerEvent event) {
       progress_.event(selection_.model_of(job), std::move(event));
     };
-    progress_.forecast_summary(selection_.jobs().size(), plan_.models.size(), told_stale());
+    progress_.forecast_summary(selection_.jobs().size(), plan_.models.size(), selection_.recalled_failures(),
+                               told_stale());
     const auto on_finish = [&](std::size_t job, const WorkerReport&) {
       progress_.foreseen(selection_.model_of(job));
     };

@@ -37,7 +37,7 @@ function made(name) {
     if (!fs.existsSync(scan)) return false;
     run(env.texmesh, 'compile', scan, '-o', file, '--quiet', '--quality.views', '1');
   }
-  if (!fs.existsSync(folder)) run(env.texmesh, 'export', file, '--to', 'model-viewer', '--plain', '-o', folder);
+  if (!fs.existsSync(folder)) run(env.texmesh, 'export', file, '--to', 'model-viewer', '--plain', '--script', 'x.js', '-o', folder);
   return true;
 }
 const names = Object.keys(kScans).filter(made);

@@ -153,6 +153,7 @@ ExportOptions export_options_of(const ExportArguments& a) {
     o.plain = true;
   if (!o.url.empty() && !o.url.ends_with("/")) o.url += "/";
   if (o.target == ExportTarget::kOembed) o.viewer = viewer_folder(a.viewer);
+  if (is_page && o.script.empty()) o.viewer = model_viewer_folder(a.viewer);
   return o;
 }
 
@@ -227,8 +228,7 @@ void add_target_options(Command& c, ExportArguments& args) {
       .shows_default();
   add_keep_units_flag(c, args.options.keep_units);
   c.option("--script", args.options.script,
-           "model-viewer: URL of its script, as the page names it; default: a version of it from jsDelivr, "
-           "with its digest",
+           "model-viewer: URL of its script, as the page names it; default: a copy stands beside the page",
            "URL");
 }
 
@@ -240,8 +240,10 @@ void add_oembed_options(Command& c, ExportArguments& args) {
   c.option("--height", args.height_px, "oembed: height of the frame, px")
       .integer_in(64, 8192)
       .shows_default();
-  c.option("--viewer", args.viewer,
-           "oembed: folder with the built viewer, instead of the viewer of this build", "DIR");
+  c.option(
+      "--viewer", args.viewer,
+      "oembed: folder with the built viewer, model-viewer: with model-viewer.min.js; default: this build's",
+      "DIR");
 }
 
 constexpr std::uint64_t kMostSiteTextBytes = 1'000'000;  // of a style sheet, and of words
@@ -520,8 +522,8 @@ void add_export_command(Command& app) {
       "its source has it; nothing puts it on the globe.\n"
       "gltf-lod: all major scales from the finest on; levels share materials and textures.\n"
       "model-viewer: index.html, model.glb and the poster, which stands there, too, where the script is blocked. The "
-      "script comes from jsDelivr unless --script names your copy of it; with --draco or --bytes it fetches a "
-      "decoder from gstatic.com.\n"
+      "script stands beside it, unless --script names another; with --draco or --bytes it fetches a decoder "
+      "from gstatic.com.\n"
       "oembed: a copy of the package, the viewer and oembed.json, to be put at --url. If a URL names "
       "the package, the package stays there.\n"
       "export.json in the folder lists what was written. The same package gives the same files.\n"

@@ -240,6 +240,21 @@ TEST_F(Collection, ADryRunSaysFirstHowManyAndThenALineAModel) {
       << title.output;
 }
 
+TEST_F(Collection, ADryRunCountsWhatFailedBefore) {
+  ASSERT_NO_FATAL_FAILURE(add_model("a", 1));
+  write_text(model("bad.obj"), "f 1 2 3\n");
+  ASSERT_EQ(compile().exit_code, 1);
+  const auto says = [&](const char* counts, std::vector<std::string> more = {}) {
+    more.emplace_back("--dry-run");
+    const CommandResult r = compile(more);
+    EXPECT_NE(r.output.find(std::string(counts) + ". Nothing was written.\n"), std::string::npos) << r.output;
+  };
+  says("0 would run, 1 up to date, 1 failed before");
+  says("1 would run, 1 up to date", {"--retry-failed"});
+  ASSERT_NO_FATAL_FAILURE(add_model("b", 2));
+  says("1 would run, 1 up to date, 1 failed before");
+}
+
 TEST_F(Collection, AnErrorOfTheMachineIsNotRemembered) {
   ASSERT_NO_FATAL_FAILURE(add_model("a", 1));
   fs::create_directories(folder_ / "out/a.texmesh/in the way");  // the package cannot take this name

@@ -199,7 +199,9 @@ TEST_F(CompileNotes, FilesHaveThemInTheirOwnCoordinates) {
   EXPECT_NE((small.output + small.errors).find("the bytes do not hold the notes"), std::string::npos)
       << small.output;
   const std::string page = folder_ / "page";
-  ASSERT_EQ(run_command({TEXMESH_BINARY, "export", package_, "--to", "model-viewer", "-o", page}).exit_code,
+  ASSERT_EQ(run_command(
+                {TEXMESH_BINARY, "export", package_, "--to", "model-viewer", "--script", "x.js", "-o", page})
+                .exit_code,
             0);
   const std::string html = read_text(page + "/index.html");
   EXPECT_NE(html.find("slot=\"hotspot-2\""), std::string::npos);
@@ -209,7 +211,9 @@ TEST_F(CompileNotes, FilesHaveThemInTheirOwnCoordinates) {
 TEST_F(CompileNotes, ScriptStaysText) {
   ASSERT_EQ(compile({"--up", "keep", "--annotations", folder_ / "notes.json"}).exit_code, 0);
   const std::string page = folder_ / "page";
-  ASSERT_EQ(run_command({TEXMESH_BINARY, "export", package_, "--to", "model-viewer", "-o", page}).exit_code,
+  ASSERT_EQ(run_command(
+                {TEXMESH_BINARY, "export", package_, "--to", "model-viewer", "--script", "x.js", "-o", page})
+                .exit_code,
             0);
   const std::string html = read_text(page + "/index.html");
   EXPECT_EQ(html.find("<script>alert"), std::string::npos);

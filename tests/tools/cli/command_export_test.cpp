@@ -25,13 +25,15 @@ class ExportCommand : public ::testing::Test {
     std::filesystem::create_directories(folder_ / "viewer/assets");
     write_text(folder_ / "viewer/index.html", "<!DOCTYPE html>");
     write_text(folder_ / "viewer/assets/a.js", "1");
+    write_text(folder_ / "viewer/model-viewer.min.js", "2");
     write_text(folder_ / "viewer/.hidden", "no");
   }
   CommandResult run(const std::string& package, const std::string& target,
                     std::vector<std::string> more = {}) {
     std::vector<std::string> all{TEXMESH_BINARY, "export", package, "--to", target, "-o", folder_ / "out"};
-    if (target == "oembed")
-      all.insert(all.end(), {"--url", "https://a.example/x", "--viewer", folder_ / "viewer"});
+    if (target == "oembed") all.insert(all.end(), {"--url", "https://a.example/x"});
+    if (target == "oembed" || target == "model-viewer")
+      all.insert(all.end(), {"--viewer", folder_ / "viewer"});
     all.insert(all.end(), more.begin(), more.end());
     return run_command(all);
   }
@@ -159,6 +161,22 @@ TEST_F(ExportCommand, AllFilesAgreeOnUnitsAndAxes) {
     tile.min = tile.min + to, tile.max = tile.max + to;
     expect_alike(truth, tile, "tiles");
   }
+}
+
+TEST_F(ExportCommand, ModelViewersScriptStandsBesideItsPage) {
+  ASSERT_EQ(run(kScan, "model-viewer").exit_code, 0);
+  const std::string page = text("index.html");
+  EXPECT_NE(page.find("<script type=\"module\" src=\"model-viewer/model-viewer.min.js\"></script>"),
+            std::string::npos);
+  EXPECT_EQ(page.find("https://cdn."), std::string::npos);
+  EXPECT_EQ(text("model-viewer/model-viewer.min.js"), "2");
+  ASSERT_EQ(run(kScan, "model-viewer", {"--script", "../mv.js"}).exit_code, 0);
+  EXPECT_NE(text("index.html").find("src=\"../mv.js\""), std::string::npos);
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "out/model-viewer"));
+  std::filesystem::remove(folder_ / "viewer/model-viewer.min.js");
+  const CommandResult missing = run(kScan, "model-viewer");
+  EXPECT_EQ(missing.exit_code, 1);
+  EXPECT_NE(missing.errors.find("--target viewer"), std::string::npos) << missing.errors;
 }
 
 TEST_F(ExportCommand, ModelViewerHasAUsdzForIphones) {

@@ -314,9 +314,10 @@ std::string summary_text(PackageReader& p, DumpGamma) {
   std::string s = about_head(p.about());
   s += fmt::format("package   {}\nformat    {}.{}, made by {}\n", to_hex(p.id()), m.major, m.minor,
                    printable(provenance.tool));
-  s += fmt::format("origin    {}\nbounds    {}\n       to {}\nsize      {}   object units\n",
-                   vector_text(m.origin), vector_text(m.bounds_min), vector_text(m.bounds_max),
-                   vector_text(m.bounds_max - m.bounds_min));
+  s += fmt::format("origin    {}\nbounds    {}\n       to {}\nsize      {}   {}\n", vector_text(m.origin),
+                   vector_text(m.bounds_min), vector_text(m.bounds_max),
+                   vector_text(m.bounds_max - m.bounds_min),
+                   p.about().metres_per_unit > 0 ? printable(p.about().unit) : "object units");
   if (m.poster)
     s += fmt::format("poster    {} x {} px, {} kB\n", m.poster->width_px, m.poster->height_px,
                      kilobytes(m.poster->bytes));

@@ -83,6 +83,7 @@ std::string_view export_template(std::string_view name) { return built_in_text(e
 
 constexpr const char* kGlbFile = "model.glb";
 constexpr const char* kUsdzFile = "model.usdz";
+constexpr const char* kScriptFolder = "model-viewer";
 
 std::string download_line(const std::string& name, std::uint64_t bytes) {
   return fmt::format("<p class=\"quiet\"><a href=\"{0}\" download=\"\">{0}</a>, {1}</p>\n", name,
@@ -123,11 +124,8 @@ std::string model_viewer_page(PackageReader& package, const ExportOptions& optio
   const About& about = package.about();
   const auto& poster = package.manifest().poster;
   const std::string title = package_title(package);
-  const std::string script = options.script.empty() ? kModelViewerScript : options.script;
-  const std::string integrity =
-      options.script.empty()
-          ? fmt::format(R"( integrity="{}" crossorigin="anonymous")", kModelViewerIntegrity)
-          : "";
+  const std::string script =
+      options.script.empty() ? fmt::format("{}/{}", kScriptFolder, kModelViewerScript) : options.script;
   return filled(export_template("model-viewer.html"),
                 {{"beginning", page_beginning(title, "")},
                  {"style", page_style(export_template("export.css"))},
@@ -135,7 +133,6 @@ std::string model_viewer_page(PackageReader& package, const ExportOptions& optio
                  {"alt", markup_escaped(about.description.empty() ? title : about.description)},
                  {"poster", poster ? R"(<img slot="poster" src="poster.jpg" alt="">)" : ""},
                  {"script", markup_escaped(script)},
-                 {"integrity", integrity},
                  {"rights", rights_line(about)},
                  {"ios", ios},
                  {"hotspots", hotspots(package, place)},
@@ -300,6 +297,7 @@ void export_model_viewer(PackageReader& package, const ExportOptions& options, c
   add_glb(made, std::move(extracted), kGlbFile);
   made.files.insert(made.files.begin(),
                     text_file("index.html", model_viewer_page(package, options, made, place)));
+  if (options.script.empty()) made.copies.push_back({kScriptFolder, options.viewer});
   add_poster(package, made);
 }
 

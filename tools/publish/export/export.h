@@ -28,15 +28,9 @@ struct ExportOptions {
   std::string url;                              // oembed: where the folder will stand, ends with a slash
   std::string provider;                         // oembed; "" = the host of `url`
   std::uint32_t width_px = 640, height_px = 480;  // oembed: of the frame
-  std::string script;                             // model-viewer: URL of the script; "" = kModelViewerScript
-  std::string viewer;                             // oembed: folder with the built viewer
+  std::string script;  // model-viewer: URL of the script; "" = a copy of `viewer`'s
+  std::string viewer;  // folder with the built viewer, or of model-viewer with its script (served_files.h)
 };
-
-/// Where a page gets <model-viewer> from, and the digest that its browser asks for.
-inline constexpr const char* kModelViewerScript =
-    "https://cdn.jsdelivr.net/npm/@google/model-viewer@4.4.0/dist/model-viewer.min.js";
-inline constexpr const char* kModelViewerIntegrity =
-    "sha384-wjsPzEO+lXOf7d9csIDfAQpPt2OKuUU3m0K9qsdKIuzX4N8czSF6hdh23eAbZa3p";
 
 struct ExportedFile {
   std::string path;  // relative to the folder

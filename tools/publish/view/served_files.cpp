@@ -134,6 +134,22 @@ void list_packages(const fs::path& folder, const std::string& prefix, int depth,
   }
 }
 
+/// viewer/ or model-viewer/, in which `file` stands.
+std::string built_folder(const std::string& name, const char* file, const std::string& wanted) {
+  std::error_code error;
+  const fs::path folder = fs::read_symlink("/proc/self/exe", error).parent_path();
+  std::vector<fs::path> candidates{folder / ".." / name, folder / "../share/texmesh" / name};
+  if (!wanted.empty()) candidates = {wanted};
+  for (const fs::path& c : candidates)
+    if (fs::is_regular_file(c / file, error)) return c.lexically_normal().string();
+  fs::path build = (folder / "..").lexically_normal().parent_path();
+  if (!fs::is_regular_file(build / "CMakeCache.txt", error)) build = "build/release";
+  throw InputError(wanted.empty() ? "the " + name : wanted, "",
+                   "the built " + name + "; to build it, run: cmake --build " + build.string() +
+                       " --target viewer (it needs node and npm)",
+                   std::string("no ") + file);
+}
+
 }  // namespace
 
 ServedFile::~ServedFile() {
@@ -214,19 +230,9 @@ std::vector<std::string> ServedFiles::packages() const {
   return found;
 }
 
-std::string viewer_folder(const std::string& wanted) {
-  std::error_code error;
-  const fs::path folder = fs::read_symlink("/proc/self/exe", error).parent_path();
-  std::vector<fs::path> candidates{folder / "../viewer", folder / "../share/texmesh/viewer"};
-  if (!wanted.empty()) candidates = {wanted};
-  for (const fs::path& c : candidates)
-    if (fs::is_regular_file(c / "index.html", error)) return c.lexically_normal().string();
-  fs::path build = (folder / "..").lexically_normal().parent_path();
-  if (!fs::is_regular_file(build / "CMakeCache.txt", error)) build = "build/release";
-  throw InputError(wanted.empty() ? "the viewer" : wanted, "",
-                   "the built viewer; to build the viewer, run: cmake --build " + build.string() +
-                       " --target viewer (it needs node and npm)",
-                   "no index.html");
+std::string viewer_folder(const std::string& wanted) { return built_folder("viewer", "index.html", wanted); }
+std::string model_viewer_folder(const std::string& wanted) {
+  return built_folder("model-viewer", kModelViewerScript, wanted);
 }
 
 }  // namespace texmesh

@@ -78,5 +78,8 @@ struct PackageList {
 /// executable's folder (a build tree) or share/texmesh/viewer of an installation. InputError, which says how
 /// to build it, where there is none.
 std::string viewer_folder(const std::string& wanted);
+/// The same for the folder with the script of <model-viewer> and its licence, model-viewer/.
+inline constexpr const char* kModelViewerScript = "model-viewer.min.js";
+std::string model_viewer_folder(const std::string& wanted);
 
 }  // namespace texmesh

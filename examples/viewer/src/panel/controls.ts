@@ -50,7 +50,7 @@ export class Controls {
   /** Offers the scales of a package. */
   offerScales(m: Manifest): void {
     const scales =
-      m.scales.map((s): Option => [String(s.scale), `S${s.scale} · ${format.count(s.triangles)} triangles`]);
+      m.scales.map((s): Option => [String(s.scale), `S_${s.scale} · ${format.count(s.triangles)} triangles`]);
     this.scaleSelect.replaceChildren(...options([kScaleByDisplay, ...scales]));
     this.scaleSelect.value = this.choices.scale === null ? '' : String(this.choices.scale);
     if (this.scaleSelect.selectedIndex < 0) this.scaleSelect.value = String(m.scales.at(-1)?.scale ?? '');

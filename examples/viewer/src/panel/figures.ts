@@ -45,7 +45,7 @@ export class Figures {
 
 /** What is in the scene. */
 export function shownName({ scale, proxy }: Pick<Live, 'scale' | 'proxy'>): string {
-  return proxy >= 0 ? `proxy ${proxy}` : scale === null ? '–' : `S${scale}`;
+  return proxy >= 0 ? `proxy ${proxy}` : scale === null ? '–' : `S_${scale}`;
 }
 
 function secondsOrDash(s: number): string {

@@ -10,7 +10,7 @@ export function scalePlot(live: () => Live): SectionPlots {
   return {
     title: 'Scales',
     note: 'Triangles that are enough at a height on the screen. Up to that height, the mesh looked like ' +
-      'the finest one (S0) in all pictures that the build compared. The dot is what is shown.',
+      'the finest one (S_0) in all pictures that the build compared. The dot is what is shown.',
     open: true,
     plots: [{
       options: {
