@@ -391,12 +391,13 @@ void add_extract_options(Command& c, ExtractArguments& args) {
   c.option("-o,--output", args.output, "The GLB to write; a name that ends in .usdz gives USDZ, for iPhones",
            "FILE")
       .required();
-  const Option bytes =
-      c.option("--bytes", args.bytes, asked_bytes,
-               "The best-looking file of at most so many bytes, and at least 98 % of them: 500kB, 2MB. "
-               "Several (50kB,500kB) give a file each, bust-50kB.glb and bust-500kB.glb for -o bust.glb, and "
-               "share the search",
-               "SIZE[,SIZE...]");
+  const Option bytes = c.option(
+      "--bytes", args.bytes, asked_bytes,
+      "The best-looking file of at most so many bytes, and at least 98 % of them if the package has as much: "
+      "500kB, 2MB. "
+      "Several (50kB,500kB) give a file each, bust-50kB.glb and bust-500kB.glb for -o bust.glb, and "
+      "share the search",
+      "SIZE[,SIZE...]");
   const Option scale =
       c.option("--scale", args.scale,
                "This scale (texmesh dump lists the scales); default: the scale that suits --display")
@@ -597,9 +598,9 @@ void add_extract_command(Command& app) {
       "(EXT_meshopt_compression). WebP needs EXT_texture_webp, AVIF EXT_texture_avif. For programs without these use --plain.\n"
       "A USDZ has plain meshes, JPEG and PNG, and materials as UsdPreviewSurface. extract refuses what that cannot "
       "say. Of --bytes a USDZ keeps the upper bound alone; its difference is that of the GLB it is made of.\n"
-      "Exit code: 0, 1 when the package is damaged or the GLB cannot be written, 2 usage, 4 when no file "
-      "between 98 % and 100 % of --bytes is possible: extract then writes the nearest file. A file that "
-      "already holds everything in a package of JPEG sources is no failure.");
+      "Exit code: 0, 1 when the package is damaged or the GLB cannot be written, 2 usage, 4 when the "
+      "package gives no file of at most --bytes: extract then writes its smallest. A file that holds all "
+      "there is and stays below 98 % of --bytes is no failure, and a note tells it.");
 }
 
 }  // namespace texmesh

@@ -231,9 +231,8 @@ std::string extract_text(const Extracted& e) {
         e.views > 0 ? fmt::format(", {} views", e.views) : ", as tables tell it,", e.side_px, e.difference,
         e.mesh_difference);
   if (!e.within)
-    text += fmt::format(
-        "{} bytes cannot be reached within 2 %: this is the nearest file that the package gives\n",
-        grouped(e.asked_bytes));
+    text += fmt::format("{} bytes cannot be kept: this is the smallest file that the package gives\n",
+                        grouped(e.asked_bytes));
   for (const std::string& n : e.notes) text += "note: " + n + "\n";
   return text;
 }

@@ -109,9 +109,9 @@ struct Extracted {
 
   // Of a file for a number of bytes:
   std::uint64_t asked_bytes = 0;  // 0 for other files
-  /// Whether the file has at most `asked_bytes`, and at least 98 % of them or all that the package has of the
-  /// source, or is a proxy that looks better than any such file. If not, it is the nearest that the package
-  /// can give.
+  /// Whether the file has at most `asked_bytes`. If not, it is the smallest that the package can give. Less
+  /// than 98 % of them where the package has no more to put in, which a note tells, or where a proxy looks
+  /// better.
   bool within = true;
   /// FLIP of the file's lit pictures against those of the package's best, 0 = equal, measured from `views`
   /// directions at `side_px`; -1 for other files.
@@ -142,15 +142,16 @@ struct Extracted {
       "left out; 0 = the smallest.");
     v("asked_bytes", s.asked(s.asked_bytes), "--bytes.");
     v("within", s.asked(s.within),
-      "bytes is at most asked_bytes, and at least 98 % of it unless the file has S_0 and all of the source's "
-      "JPEG coefficients; otherwise the file is the nearest possible one.");
+      "bytes is at most asked_bytes, and at least 98 % of it unless the package has no more to put in; "
+      "otherwise the file is the smallest possible one.");
     v("difference", s.asked(s.difference), Range{0, 1},
       "Mean FLIP of the file's lit pictures against those of the package's best, over the object's pixels; 0 = "
       "equal.");
     v("mesh_difference", s.asked(s.mesh_difference), Range{0, 1},
       "The same with the best textures instead: what the mesh alone costs.");
     v("views", s.asked(s.views), Range{0, 1000},
-      "Directions from which it was measured; 0 with --fast: the package's tables tell the differences.");
+      "Directions from which it was measured; 0 with --fast: the package's tables tell the differences; 0 also for S_0 "
+      "with all of the source's own images.");
     v("side_px", s.asked(s.side_px), Range{1, 65536}, "Side of those pictures.");
     v("spent", s.asked(s.spent), "Processor time of the search, seconds; it differs from run to run.");
     v("notes", s.notes, "");

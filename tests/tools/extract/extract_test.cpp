@@ -149,12 +149,15 @@ TEST(ExtractModel, LevelsShareTexturesAndStandBehindTheFinest) {
 TEST(ExtractModel, BytesAreMetWithinTwoPercentFromBelow) {
   const std::uint64_t smallest = extract_within(1).glb.size();
   const Extracted most = extract_within(10'000'000);
-  EXPECT_FALSE(most.within);
+  EXPECT_TRUE(most.within);
+  EXPECT_TRUE(std::ranges::any_of(most.notes, [](const std::string& note) {
+    return note.find("no more to put into the file") != std::string::npos;
+  }));
   int within = 0, asked = 0;
   for (std::uint64_t bytes = smallest + 300; bytes < most.glb.size(); bytes += 160, ++asked) {
     const Extracted e = extract_within(bytes);
     EXPECT_LE(e.glb.size(), bytes);
-    EXPECT_EQ(e.within, static_cast<double>(e.glb.size()) >= 0.98 * static_cast<double>(bytes));
+    EXPECT_GE(static_cast<double>(e.glb.size()), 0.98 * static_cast<double>(bytes));
     expect_valid(e.glb, std::to_string(bytes));
     EXPECT_EQ(e.mesh_bytes + e.images[0].bytes, e.glb.size());
     EXPECT_TRUE(e.within) << bytes << " got " << e.glb.size() << " S_" << e.scale << " "

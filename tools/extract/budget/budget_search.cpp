@@ -3,8 +3,9 @@
 // render lights them. Everything is judged by FLIP against these pictures.
 // 2. Candidates are coded meshes and coded images. Each is made when it is first asked for.
 // 3. Small windows of the pictures tell what bytes are worth. S_0 is rendered with one image coded in many
-// ways, which gives each image a curve of loss against bytes (LossCurves). Every coded mesh is rendered with
-// the best textures. Losses of mesh and textures are added up.
+// ways, which gives each image a curve of loss against bytes (LossCurves). Of a large texture only the parts
+// are coded that the windows read (TextureTiles). Every coded mesh is rendered with the best textures. Losses
+// of mesh and textures are added up.
 // 4. The mesh: compile has measured what scales lose, so two or three meshes that are made and looked at tell
 // which is likely. From it, with --best from another likely one, the search walks to neighbours, finer and
 // coarser, while the sum of losses falls. What a mesh leaves of the bytes is dealt out along the curves,
@@ -14,6 +15,7 @@
 // meshes, other sizes and codings of the texture that loses most. In a large file textures may be full: then
 // the mesh is finer.
 // 7. Last, proxies of the package are tried in its place (offer_proxies()).
+// Where the bytes hold S_0 and all of the source's own images, nothing is looked for (whole_source()).
 #include "tools/extract/budget/budget_search.h"
 
 #include <numeric>
@@ -50,9 +52,6 @@ double most_texels(const ExtractBudget& wishes, std::uint64_t bytes) {
   const double a_byte = wishes.fast() ? kFastTexelsPerByte : kTexelsPerByte;
   return std::max(a_byte * static_cast<double>(bytes), 65536.0);
 }
-
-/// S_0 as it is stored.
-bool is_finest(const MeshKey& key) { return key.scale == 0 && key.coding + 1 == kMeshCodings; }
 
 /// The finest that is likely to leave half of the bytes to textures.
 std::size_t likely_scale(const Reference& reference, std::uint64_t bytes) {
@@ -106,11 +105,31 @@ std::optional<DealtBytes> with_largest_loss_resized(DealtBytes images, int steps
   return images;
 }
 
+/// Whether the bytes hold S_0 and all of the source's own images as the package has them.
+bool holds_source(PackageReader& package, const ExtractBudget& wishes, std::uint64_t bytes) {
+  if (wishes.scale.value_or(0) != 0 || wishes.levels || wishes.effort != ExtractEffort::kUsual ||
+      (wishes.images != ExtractImages::kAuto && wishes.images != ExtractImages::kJpeg))
+    return false;
+  std::uint64_t all = package.manifest().scales.front().glb.bytes;
+  for (const PackageImage& image : package_images(package)) {
+    const TextureInfo& info = package.textures().at(image.plane);
+    if (image.alpha_plane || !info.source_rung) return false;
+    all += info.rungs.back().bytes;
+  }
+  return all <= bytes;
+}
+
+/// All images together: fewer cannot fill the bytes.
+double least_texels(std::uint64_t bytes) {
+  constexpr double kLeastTexelsPerByte = 3;
+  return kLeastTexelsPerByte * static_cast<double>(bytes);
+}
+
 /// What searches for several numbers of bytes share.
 struct SharedSearch {
   SharedSearch(PackageReader& package, const ExtractBudget& wishes, const OutputTransform& place,
                std::uint64_t bytes, const RunContext& context)
-      : textures(package, most_texels(wishes, bytes), context, wishes.fast()),
+      : textures(package, most_texels(wishes, bytes), context, wishes.effort, least_texels(bytes)),
         reference(package, wishes, place, textures, context),
         candidates(reference, textures, wishes.bytes.size() > 1) {}
   TextureSource textures;
@@ -127,13 +146,26 @@ double CpuClock::since_last_s() {
 }
 
 Search::Search(const Reference& reference, Candidates& candidates, std::uint64_t bytes)
-    : reference_(reference),
-      candidates_(candidates),
-      bytes_(bytes),
-      curves_(reference, candidates, likely_texture_bytes(reference, bytes)),
-      filling_(reference, candidates, bytes) {}
+    : reference_(reference), candidates_(candidates), bytes_(bytes), filling_(reference, candidates, bytes) {}
+
+const LossCurves& Search::curves() {
+  if (!curves_) curves_.emplace(reference_, candidates_, likely_texture_bytes(reference_, bytes_));
+  return *curves_;
+}
+
+std::optional<Extracted> Search::source_file() {
+  DealtBytes images;
+  for (std::size_t i = 0; i < reference_.images.size(); ++i)
+    images.images.push_back({{{FileImage::kJpeg, false, true}, 1, kHighestQuality}, 0, 0});
+  FoundFile found = file_of({0, kMeshCodings - 1}, images);
+  if (!filling_.fits(found.file)) return std::nullopt;
+  Extracted out = finish(std::move(found));
+  out.spent.file_cpu_s = clock_.since_last_s();
+  return out;
+}
 
 Extracted Search::run(const std::function<void(double)>& report) {
+  curves();
   report(0.4);
   spent_.images_cpu_s = clock_.since_last_s();
   choose_mesh();
@@ -141,7 +173,7 @@ Extracted Search::run(const std::function<void(double)>& report) {
   report(0.6);
   FoundFile found = filled_file();
   if (reference_.wishes.effort == ExtractEffort::kUsual && filling_.fits(found.file) &&
-      !filling_.fills(found.file) && !is_finest(found.key)) {  // other meshes may come nearer to the bytes
+      !filling_.fills(found.file) && !found.key.is_finest()) {  // other meshes may come nearer to the bytes
     only_likely_ = false;
     seen_.clear();
     walk_to_mesh();
@@ -202,7 +234,7 @@ double Search::scale_loss(std::size_t scale) const {
 
 /// Compile has measured what scales lose, and a coding loses and saves about alike on all of them: so one
 /// mesh that was made and looked at tells what a file of another is likely to lose.
-double Search::likely_loss(const MeshKey& key) const {
+double Search::likely_loss(const MeshKey& key) {
   constexpr double kFinerScalesTakeLess = 0.35;  // bytes of a triangle ~ triangles to the power of minus this
   const auto triangles = [&](std::size_t scale) { return static_cast<double>(scales()[scale].triangles); };
   const LikelyCoding &of_known = kLikelyCodings[known_.coding], &of_key = kLikelyCodings[key.coding];
@@ -212,14 +244,14 @@ double Search::likely_loss(const MeshKey& key) const {
                        portable::exp((1 - kFinerScalesTakeLess) *
                                      portable::log(triangles(key.scale) / triangles(known_.scale)));
   const double left = static_cast<double>(bytes_) - bytes;
-  const DealtBytes images = curves_.allocate(left);
+  const DealtBytes images = curves().allocate(left);
   return images.bytes > left ? kNothing : scale_losses * scale_loss(key.scale) + of_key.loss + images.loss;
 }
 
 /// The likeliest mesh is made and looked at until it is known.
 void Search::choose_mesh_by_tables() {
-  const int most = reference_.wishes.fast() ? 2 : 3;
-  for (int tries = 0; tries < most; ++tries) {
+  for (int tries = 0; tries < 3; ++tries) {
+    if (reference_.wishes.fast() && least_ < kNothing) return;
     MeshKey likely = known_;
     double least = kNothing;
     for (std::size_t scale = 0; scale < scales().size(); ++scale)
@@ -315,7 +347,7 @@ double Search::loss_of(const MeshKey& key) {
   known_ = key;
   known_bytes_ = static_cast<double>(mesh(key).fixed_bytes);
   const double left = bytes_left(mesh(key));
-  const DealtBytes images = curves_.allocate(left);
+  const DealtBytes images = curves().allocate(left);
   if (images.bytes > left) return kNothing;
   return predicted_[key] = joined(geometry) + images.loss;
 }
@@ -395,7 +427,7 @@ bool Search::try_other_shares(FoundFile& best) {
   bool nearer = try_file(best.key, same, best);
   for (const std::size_t image : largest_but(best.images, most))
     for (const int step : {-1, 1})
-      while (const CodedImage* other = curves_.neighbour(image, best.images.images[image], step)) {
+      while (const CodedImage* other = curves().neighbour(image, best.images.images[image], step)) {
         DealtBytes images = best.images;
         images.images[image] = *other;
         images.last = most;
@@ -440,16 +472,16 @@ void Search::try_smaller_than_stored(FoundFile& best) {
       try_file(best.key, *other, best);
 }
 
-std::vector<double> Search::differences_of(const MeshKey& key, const FilledFile& file) {
-  OtherTextures textures;
+double Search::difference_of(const MeshKey& key, const FilledFile& file) {
+  std::vector<RenderTexture> textures(reference_.shown.size());
   for (std::size_t i = 0; i < reference_.images.size(); ++i)
-    textures.merge(candidates_.shown_by(i, file.images.at(reference_.images[i].image), reference_.context));
-  const LitViews views(candidates_.lit_mesh(key), reference_.cameras, reference_.context);
-  std::vector<OtherTextures> changes;
-  changes.emplace_back();  // none: what the mesh alone costs
-  changes.push_back(std::move(textures));
-  return reference_.whole_meter->differences(views, reference_.best_textures, std::move(changes),
-                                             reference_.context);
+    for (auto& [t, texture] :
+         candidates_.shown_by(i, file.images.at(reference_.images[i].image), reference_.context))
+      textures[t] = std::move(texture);
+  std::unique_ptr<const LitViews> made;
+  if (!key.is_finest()) made = candidates_.made_views(key);
+  return reference_.whole_meter->difference(made ? *made : *reference_.finest_views, textures,
+                                            reference_.context);
 }
 
 /// `from` with its mesh coded finer by parts of a bit: the largest file that was found. Nothing
@@ -473,7 +505,7 @@ std::optional<FoundFile> Search::larger_by_bits(const FoundFile& from, std::size
 /// Where textures cannot take the bytes that are left: the same mesh coded finer, or a finer scale. Of
 /// several codings the one that looks nearest.
 void Search::fill_by_mesh(FoundFile& best) {
-  if (is_finest(best.key) || !mesh(best.key).file->has_draco()) return;
+  if (best.key.is_finest() || !mesh(best.key).file->has_draco()) return;
   const FoundFile from = best;
   look_at(best);
   for (std::size_t scale = from.key.scale;; --scale) {
@@ -497,8 +529,10 @@ Extracted Search::finish(FoundFile found) {
   out.scale = mesh.scale;
   out.levels = mesh.levels;
   out.triangles = mesh.triangles;
-  out.within =
-      filling_.fills(file) || (filling_.fits(file) && (fast || (file.has_sources && is_finest(key))));
+  out.within = filling_.fits(file);
+  if (out.within && !filling_.fills(file) && (!fast || file.has_sources))
+    out.notes.emplace_back(
+        "the package has no more to put into the file: it is smaller than the bytes asked for");
   out.views = static_cast<int>(reference_.cameras.size());
   out.side_px = reference_.side_px;
   out.asked_bytes = bytes_;
@@ -509,13 +543,30 @@ Extracted Search::finish(FoundFile found) {
     out.mesh_difference = table_geometry(key);
     out.difference = std::min(1.0, std::sqrt(joined(out.mesh_difference) + found.images.loss));
   } else {
-    const std::vector<double> differences = differences_of(key, file);
-    out.mesh_difference = differences[0];
-    out.difference = differences[1];
+    out.mesh_difference = mesh.geometry;
+    out.difference = found.difference < 1 ? found.difference : difference_of(key, file);
   }
   out.glb = std::move(file.glb);
   return out;
 }
+
+namespace {
+
+/// S_0 and all of the source's own images, where the bytes hold them: nothing looks nearer, so nothing is
+/// looked at.
+std::optional<Extracted> whole_source(PackageReader& package, const ExtractBudget& wishes,
+                                      const OutputTransform& place, std::uint64_t bytes,
+                                      const RunContext& context) {
+  if (!holds_source(package, wishes, bytes)) return std::nullopt;
+  ExtractBudget tables = wishes;
+  tables.effort = ExtractEffort::kFast;
+  TextureSource textures(package, 0, context, tables.effort);
+  const Reference reference(package, tables, place, textures, context, 0);
+  Candidates candidates(reference, textures);
+  return Search(reference, candidates, bytes).source_file();
+}
+
+}  // namespace
 
 std::vector<Extracted> extract_within_bytes(PackageReader& package, const ExtractBudget& wishes,
                                             const OutputTransform& place, const RunContext& context) {
@@ -531,7 +582,12 @@ std::vector<Extracted> extract_within_bytes(PackageReader& package, const Extrac
     const auto report = [&](double part) {
       context.report((static_cast<double>(i) + part) / static_cast<double>(order.size()));
     };
-    if (!shared || !shared->textures.serves(most_texels(wishes, wanted))) {
+    if (std::optional<Extracted> source = whole_source(package, wishes, place, wanted, context)) {
+      out[order[i]] = *std::move(source);
+      report(1);
+      continue;
+    }
+    if (!shared || !shared->textures.serves(most_texels(wishes, wanted), least_texels(wanted))) {
       shared.reset();  // before the next one needs the memory
       shared = std::make_unique<SharedSearch>(package, wishes, place, wanted, context);
     }

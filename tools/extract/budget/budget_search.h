@@ -36,19 +36,20 @@ struct FoundFile {
 /// The search for the file of one number of bytes: see the top of the .cpp.
 class Search {
  public:
-  /// Measures the curves of the images.
   Search(const Reference& reference, Candidates& candidates, std::uint64_t bytes);
   /// `report`: parts of the way.
   Extracted run(const std::function<void(double)>& report);
+  /// S_0 and the source's own images; nothing where the bytes do not hold them.
+  std::optional<Extracted> source_file();
 
   // What run() is made of.
-  const LossCurves& curves() const { return curves_; }
+  const LossCurves& curves();  // measured when they are first asked for
   const Filling& filling() const { return filling_; }
   /// The mesh of a file of so many bytes, kept until it is forgotten.
   const MeshFile& mesh(const MeshKey& key);
   /// The file that fills the bytes. It is not looked at.
   FoundFile file_of(const MeshKey& key, const DealtBytes& images);
-  void look_at(FoundFile& found) { found.difference = differences_of(found.key, found.file).back(); }
+  void look_at(FoundFile& found) { found.difference = difference_of(found.key, found.file); }
   /// The texture that loses most in other sizes and codings, with more or fewer bytes for others, and with
   /// the mesh coded finer or leaner, as long as that is nearer.
   void try_other_files(FoundFile& best);
@@ -66,7 +67,7 @@ class Search {
   const std::vector<ManifestScale>& scales() const { return reference_.package.manifest().scales; }
   void forget(const MeshKey& key);
   double bytes_left(const MeshFile& mesh) const;
-  DealtBytes allocation_of(const MeshKey& key) { return curves_.allocate(bytes_left(mesh(key))); }
+  DealtBytes allocation_of(const MeshKey& key) { return curves().allocate(bytes_left(mesh(key))); }
 
   FoundFile filled_file();
   void choose_mesh();
@@ -76,7 +77,7 @@ class Search {
   bool better(const MeshKey& key);
   bool too_large(const MeshKey& key) const;
   double least_loss(const MeshKey& key) const;
-  double likely_loss(const MeshKey& key) const;
+  double likely_loss(const MeshKey& key);
   double scale_loss(std::size_t scale) const;
   double table_geometry(const MeshKey& key) const;
   double loss_of(const MeshKey& key);
@@ -93,8 +94,7 @@ class Search {
 
   std::optional<FoundFile> larger_by_bits(const FoundFile& from, std::size_t scale, int coding);
   void fill_by_mesh(FoundFile& best);
-  /// Of the mesh alone, and of the file.
-  std::vector<double> differences_of(const MeshKey& key, const FilledFile& file);
+  double difference_of(const MeshKey& key, const FilledFile& file);
   Extracted finish(FoundFile found);
 
   const Reference& reference_;
@@ -102,7 +102,7 @@ class Search {
   const std::uint64_t bytes_;
   CpuClock clock_;
   ExtractSpent spent_;
-  const LossCurves curves_;
+  std::optional<LossCurves> curves_;
   const Filling filling_;
   std::map<MeshKey, MeshFile> meshes_;
   std::set<MeshKey> seen_;

@@ -8,8 +8,9 @@
 namespace texmesh {
 namespace {
 
-constexpr std::size_t kTrialsAtOnce = 24;  // a megabyte or two each
-constexpr std::size_t kMostScales = 3;     // decoded at a time: tens of megabytes each
+constexpr std::size_t kTrialsAtOnce = 24;     // a megabyte or two each
+constexpr std::uint32_t kMostWebpPx = 16383;  // of a side, of the format
+constexpr std::size_t kMostScales = 3;        // decoded at a time: tens of megabytes each
 
 /// Bits per coordinate along the longest side of the object, of texture coordinates along the image, of
 /// normals and vertex colours; for pictures 512 px high.
@@ -83,14 +84,14 @@ const MeshCandidate& Candidates::mesh(const MeshKey& key) {
   c.levels = reference_.wishes.levels ? levels_of(m, c.scale) : std::vector<int>{c.scale};
   c.triangles = m.scales[key.scale].triangles;
   std::unique_ptr<StandaloneGlb> file = recoded_scale(c.scale, key);
-  const bool fast = reference_.wishes.fast();
-  if (!fast) c.lit = made_lit_mesh(*file, c.scale);
+  const bool looked_at = !reference_.wishes.fast() && !key.is_finest();
+  if (looked_at) c.lit = made_lit_mesh(*file, c.scale);
   if (reference_.wishes.levels) file->begin_levels(screen_coverage_of(m, c.scale));
   for (std::size_t l = 1; l < c.levels.size(); ++l)
     file->add_level(*recoded_scale(c.levels[l], key), screen_coverage_of(m, c.levels[l]));
   file->place(reference_.place);
   c.file = std::move(file);
-  if (fast) return c;
+  if (!looked_at) return c;
   const LitViews windows(*c.lit, reference_.windows, reference_.context);
   c.geometry = reference_.window_meter->difference(windows, reference_.best_textures, reference_.context);
   return c;
@@ -99,8 +100,13 @@ const MeshCandidate& Candidates::mesh(const MeshKey& key) {
 const LitMesh& Candidates::lit_mesh(const MeshKey& key) {
   mesh(key);
   MeshCandidate& c = meshes_.at(key);
+  if (key.is_finest()) return reference_.finest;
   if (!c.lit) c.lit = made_lit_mesh(*recoded_scale(c.scale, key), c.scale);
   return *c.lit;
+}
+
+std::unique_ptr<const LitViews> Candidates::made_views(const MeshKey& key) {
+  return std::make_unique<LitViews>(lit_mesh(key), reference_.cameras, reference_.context);
 }
 
 void Candidates::forget(const MeshKey& key) {
@@ -122,6 +128,12 @@ double size_step(int step) {
   return step == 1 ? share / std::sqrt(2.0) : share;
 }
 
+int Candidates::first_step(std::size_t image) const {
+  int step = 0;
+  while (!reference_.wishes.best() && size_step(step) > textures_.largest_share(image)) ++step;
+  return step;
+}
+
 std::vector<TextureCoding> Candidates::codings(std::size_t image) const {
   const ExtractImages wanted = reference_.wishes.images;
   const bool alpha = reference_.images[image].alpha_plane.has_value();  // which no JPEG holds
@@ -130,7 +142,9 @@ std::vector<TextureCoding> Candidates::codings(std::size_t image) const {
   if (wanted == ExtractImages::kWebp || alpha) return {{FileImage::kWebp}};
   std::vector<TextureCoding> out{{FileImage::kJpeg, true}};
   if (reference_.images[image].colours) out.push_back({FileImage::kJpeg, false});
-  if (wanted == ExtractImages::kAuto) out.push_back({FileImage::kWebp});
+  const PackageImage& from = reference_.images[image];
+  if (wanted == ExtractImages::kAuto && std::max(from.width_px, from.height_px) <= kMostWebpPx)
+    out.push_back({FileImage::kWebp});
   return out;
 }
 
@@ -162,13 +176,17 @@ float Candidates::sharpening(std::size_t image, double share) const {
 }
 
 Pixels Candidates::texels(std::size_t image, double share) {
-  const PackageImage& from = reference_.images[image];
-  const double most = std::min(share, textures_.largest_share(image));
-  const std::uint32_t width = side_of(from.width_px, most), height = side_of(from.height_px, most);
+  const Vec2<std::uint32_t> side = sides(image, share);
   std::vector<std::uint8_t> coverage;
   if (reference_.wishes.images != ExtractImages::kPng)
-    coverage = reference_.shown_texels(image, width, height);
-  return textures_.texels(image, width, height, coverage, sharpening(image, share));
+    coverage = reference_.shown_texels(image, side.x, side.y);
+  return textures_.texels(image, side.x, side.y, coverage, sharpening(image, share));
+}
+
+Vec2<std::uint32_t> Candidates::sides(std::size_t image, double share) const {
+  const PackageImage& from = reference_.images[image];
+  const double most = std::min(share, textures_.largest_share(image));
+  return {side_of(from.width_px, most), side_of(from.height_px, most)};
 }
 
 const Pixels& Candidates::texels_of_step(std::size_t image, int step) {
@@ -204,24 +222,63 @@ std::vector<CodedImage> Candidates::measured(const std::vector<ImageTrial>& tria
   return out;
 }
 
+/// Null where a whole file is made: of stored coefficients, of codings that do not code blocks apart, of
+/// small images, and with --best.
+const TextureTiles* Candidates::tiles_for(const ImageTrial& trial) {
+  if (trial.coding.stored) load_stored(trial.image);
+  const double share = size_step(trial.step);
+  const Vec2<std::uint32_t> side = sides(trial.image, share);
+  if (reference_.wishes.best() || trial.coding.stored || trial.coding.format != FileImage::kJpeg ||
+      !TextureTiles::suits(side.x, side.y)) {
+    if (!trial.coding.stored) texels_of_step(trial.image, trial.step);
+    return nullptr;
+  }
+  const auto [known, fresh] = tiles_.try_emplace({trial.image, trial.step});
+  StepTiles& made = known->second;
+  if (!fresh) return &*made.tiles;
+  if (!places_read_.contains(trial.image))
+    places_read_[trial.image] = places_read(*reference_.finest_windows, reference_.shown, trial.image);
+  made.image = textures_.texels(trial.image, side.x, side.y, {}, sharpening(trial.image, share));
+  const double reach_px = std::max(2.0, 2 * std::sqrt(reference_.texels_per_pixel[trial.image]) * share);
+  made.tiles.emplace(made.image, reference_.shown_texels(trial.image, side.x, side.y),
+                     places_read_.at(trial.image), reach_px, reference_.context);
+  for (const PictureTexture& t : reference_.shown)
+    if (t.image == trial.image)
+      made.tiles->prepare(t.srgb, reference_.unread_levels(t.image, share), reference_.context);
+  return &*made.tiles;
+}
+
+/// What pictures show of a trial's file, and the bytes that it takes in a GLB.
+OtherTextures Candidates::trial_textures(const ImageTrial& t, const TextureTiles* tiles,
+                                         const RunContext& context, double& bytes) {
+  static const Pixels none;
+  if (!tiles) {
+    const Pixels& pixels = t.coding.stored ? none : by_step_.at({t.image, t.step});
+    const FileImageData file = encoded(t.image, pixels, t.coding, t.quality, true);
+    bytes = static_cast<double>((file.bytes.size() + 3) / 4 * 4);
+    return shown_by(t.image, file, context);
+  }
+  bytes = tiles->file_bytes(encoded(t.image, tiles->sample(), t.coding, t.quality, true).bytes.size());
+  const Pixels coded = decode_file_image(encoded(t.image, tiles->read_tiles(), t.coding, t.quality, true));
+  OtherTextures out;
+  for (std::size_t k = 0; k < reference_.shown.size(); ++k)
+    if (reference_.shown[k].image == t.image)
+      out[k] = tiles->texture_with(coded, reference_.shown[k].srgb, context);
+  return out;
+}
+
 void Candidates::measure_together(std::span<const ImageTrial> trials) {
   std::vector<CodedImage> found(trials.size());
   std::vector<OtherTextures> textures(trials.size());
-  std::vector<const Pixels*> pixels;
-  static const Pixels none;
-  for (const ImageTrial& t : trials) {
-    if (t.coding.stored) load_stored(t.image);
-    pixels.push_back(t.coding.stored ? &none : &texels_of_step(t.image, t.step));
-  }
+  std::vector<const TextureTiles*> tiles;
+  for (const ImageTrial& t : trials) tiles.push_back(tiles_for(t));
   RunContext serial = reference_.context;
   serial.threads = 1;
   parallel_for(reference_.context, trials.size(), 1, [&](std::size_t begin, std::size_t end) {
     for (std::size_t k = begin; k < end; ++k) {
       const ImageTrial& t = trials[k];
-      const FileImageData file = encoded(t.image, *pixels[k], t.coding, t.quality, true);
-      textures[k] = shown_by(t.image, file, serial);
-      found[k] = {{t.coding, size_step(t.step), t.quality},
-                  static_cast<double>((file.bytes.size() + 3) / 4 * 4)};
+      found[k].plan = {t.coding, size_step(t.step), t.quality};
+      textures[k] = trial_textures(t, tiles[k], serial, found[k].bytes);
     }
   });
   const std::vector<double> losses = reference_.window_meter->differences(
@@ -241,7 +298,8 @@ constexpr double kFewBytes = 16000;                    // of an image: other cod
 constexpr double kWebpQuality = 65, kWebpShare = 0.4;  // of a JPEG's bytes at the same quality
 constexpr double kMuch = 0.15, kLittle = 0.05;         // of all images' losses
 constexpr int kWeightings = 3;
-constexpr double kShownTexels = 5;  // per pixel: of more the picture shows means
+constexpr double kShownTexels = 5;   // per pixel: of more the picture shows means
+constexpr double kSourceFile = 0.9;  // of the bytes that the package has of a source's coefficients
 constexpr double kFarAbove = 4;  // of an image's bytes: stored coefficients would have to lose most of theirs
 
 /// Files that lie on the lower convex border, by rising bytes.
@@ -285,7 +343,12 @@ int last_step(const PackageImage& image) {
 class LossCurves::Trials {
  public:
   Trials(const LossCurves& curves, std::size_t image, double bytes)
-      : curves_(curves), image_(image), bytes_(bytes), last_(last_step(curves.reference_.images[image])) {}
+      : curves_(curves),
+        image_(image),
+        bytes_(bytes),
+        last_(last_step(curves.reference_.images[image])),
+        first_(std::min(curves.candidates_.first_step(image), last_)) {}
+  int first() const { return first_; }
   int last() const { return last_; }
 
   /// Bytes that a file is likely to have, from what was seen of the image.
@@ -301,7 +364,7 @@ class LossCurves::Trials {
   }
   /// A size beyond the ends becomes one at the end with another quality.
   void add(int step, const TextureCoding& coding, double quality) {
-    const int bounded = std::clamp(step, 0, last_);
+    const int bounded = std::clamp(step, first_, last_);
     quality = std::clamp(quality + 16 * (bounded - step), 5.0, 98.0);
     if (coding.format == FileImage::kPng) quality = 100;
     const auto same = [&](const TextureCoding& c, double share, double q) {
@@ -326,7 +389,7 @@ class LossCurves::Trials {
   const LossCurves& curves_;
   std::size_t image_;
   double bytes_;
-  int last_;
+  int last_, first_;
   std::vector<ImageTrial> list_;
 };
 
@@ -342,7 +405,15 @@ LossCurves::LossCurves(const Reference& reference, Candidates& candidates, doubl
   look_at(trials_around_first(bytes));
   find_curves();
   look_at(trials_around(allocate(bytes), bytes));
+  if (!reference.wishes.best()) add_sources(bytes);
   find_curves();
+}
+
+/// The source's own coefficients lose nothing, which needs no look.
+void LossCurves::add_sources(double most_bytes) {
+  for (std::size_t i = 0; i < seen_.size(); ++i)
+    if (const auto stored = candidates_.stored_bytes(i); stored && kSourceFile * *stored < 1.1 * most_bytes)
+      seen_[i].push_back({{{FileImage::kJpeg, false, true}, 1, kHighestQuality}, kSourceFile * *stored, 0});
 }
 
 /// A rung of one size of an image as if its fragments were a whole image.
@@ -453,7 +524,7 @@ std::vector<ImageTrial> LossCurves::first_trials(double bytes) const {
     const PackageImage& image = reference_.images[i];
     const TextureCoding coding = candidates_.codings(i).front();
     const double wanted = likely_bytes(i, bytes) * kTypicalTexelsPerByte;
-    int step = 0;
+    int step = std::min(candidates_.first_step(i), last_step(image));
     while (step + 2 < last_step(image) && texels_of(image) * size_step(step) * size_step(step) > wanted)
       step += 2;
     out.push_back({i, step, coding, kUsualQuality});
@@ -470,7 +541,7 @@ std::vector<ImageTrial> LossCurves::trials_around_first(double bytes) const {
   for (std::size_t i = 0; i < reference_.images.size(); ++i) {
     Trials trials(*this, i, bytes);
     const double wanted = likely_bytes(i, bytes);
-    int middle = 0;
+    int middle = trials.first();
     while (middle < trials.last() && trials.likely(middle, kUsualQuality) > wanted * 1.4) middle += 2;
     const TextureCoding coding = candidates_.codings(i).front();
     trials.add(middle, coding, 20);
@@ -505,14 +576,15 @@ std::vector<ImageTrial> LossCurves::trials_around(const DealtBytes& chosen, doub
     const std::vector<TextureCoding> codings = candidates_.codings(i);
     const bool few = chosen.images[i].bytes < kFewBytes;
     for (std::size_t k = 1; few && k < codings.size(); ++k) {
-      int middle = 0;
+      int middle = trials.first();
       while (middle < trials.last() && kWebpShare * trials.likely(middle, kWebpQuality) >
                                            std::max(chosen.images[i].bytes, 0.02 * bytes))
         middle += 2;
       trials.add(middle, codings[k], kWebpQuality);
       trials.add(middle + 2, codings[k], kWebpQuality);
     }
-    if (const auto stored = candidates_.stored_bytes(i)) trials.add_stored(*stored, chosen.images[i].bytes);
+    if (const auto stored = candidates_.stored_bytes(i); stored && reference_.wishes.best())
+      trials.add_stored(*stored, chosen.images[i].bytes);
     trials.append_to(out);
   }
   return out;

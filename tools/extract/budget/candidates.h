@@ -2,7 +2,7 @@
 #include <compare>
 #include <list>
 
-#include "tools/extract/budget/reference.h"
+#include "tools/extract/budget/texture_tiles.h"
 #include "tools/extract/glb/standalone_glb.h"
 
 namespace texmesh {
@@ -22,6 +22,8 @@ struct MeshKey {
   std::size_t scale = 0;
   int coding = 0;
   double extra_bits = 0;
+  /// S_0 as it is stored.
+  bool is_finest() const { return scale == 0 && coding + 1 == kMeshCodings && extra_bits >= 0; }
   friend auto operator<=>(const MeshKey&, const MeshKey&) = default;
 };
 
@@ -32,7 +34,8 @@ struct MeshCandidate {
   std::uint64_t triangles = 0;
   double geometry = 0;                        // difference with the best textures, in the windows
   std::shared_ptr<const StandaloneGlb> file;  // without what is known of the object
-  std::unique_ptr<const LitMesh> lit;  // as viewers show it; null: Candidates::lit_mesh() makes it again
+  std::unique_ptr<const LitMesh>
+      lit;  // as viewers show it; null: Candidates::lit_mesh() makes it again, or has it
 };
 
 /// Losses in the same pixels, of a mesh and of the images of a material, join about as the sum of their
@@ -93,11 +96,13 @@ class Candidates {
       : reference_(reference), textures_(textures), for_several_(for_several) {}
 
   const MeshCandidate& mesh(const MeshKey& key);
-  /// The mesh as viewers show it.
-  const LitMesh& lit_mesh(const MeshKey& key);
+  /// What cameras see of the mesh in whole pictures.
+  std::unique_ptr<const LitViews> made_views(const MeshKey& key);
   void forget(const MeshKey& key);  // a mesh takes tens of megabytes
   void forget_lit_meshes();
 
+  /// The largest size that there are texels of.
+  int first_step(std::size_t image) const;
   /// The codings that compete for an image, the usual one first.
   std::vector<TextureCoding> codings(std::size_t image) const;
   /// Bytes that the package has of the source's own coefficients; nothing where it has none, or where they
@@ -126,9 +131,14 @@ class Candidates {
   };
   ScaleToCode& scale_to_code(int scale);
   std::unique_ptr<StandaloneGlb> recoded_scale(int scale, const MeshKey& key);
+  const LitMesh& lit_mesh(const MeshKey& key);
   std::unique_ptr<const LitMesh> made_lit_mesh(const StandaloneGlb& file, int scale) const;
   float sharpening(std::size_t image, double share) const;
+  Vec2<std::uint32_t> sides(std::size_t image, double share) const;
   const Pixels& texels_of_step(std::size_t image, int step);
+  const TextureTiles* tiles_for(const ImageTrial& trial);
+  OtherTextures trial_textures(const ImageTrial& trial, const TextureTiles* tiles, const RunContext& context,
+                               double& bytes);
   void measure_together(std::span<const ImageTrial> trials);
   const Reference& reference_;
   TextureSource& textures_;
@@ -136,6 +146,12 @@ class Candidates {
   std::list<ScaleToCode> scales_;  // the last first
   std::map<MeshKey, MeshCandidate> meshes_;
   std::map<std::pair<std::size_t, int>, Pixels> by_step_;
+  struct StepTiles {
+    Pixels image;
+    std::optional<TextureTiles> tiles;
+  };
+  std::map<std::pair<std::size_t, int>, StepTiles> tiles_;
+  std::map<std::size_t, std::vector<Vec2f>> places_read_;  // by image
   std::map<std::size_t, JoinedJpeg> stored_;
   std::map<ImageTrial, CodedImage> measured_;
 };
@@ -164,6 +180,7 @@ class LossCurves {
  private:
   class Trials;
   void read_tables();
+  void add_sources(double most_bytes);
   void look_at(const std::vector<ImageTrial>& trials);
   void find_curves();
   double likely_bytes(std::size_t image, double bytes) const;

@@ -11,7 +11,9 @@ namespace {
 
 constexpr double kLeastShare = 0.98;  // of the bytes asked for
 constexpr double kNear = 0.99;        // where the search for a quality may stop
-constexpr double kMiddle = 50;        // the level at which qualities stay
+constexpr double kFastNear = 0.9;
+constexpr int kFastTries = 3;
+constexpr double kMiddle = 50;  // the level at which qualities stay
 
 bool is_lossy(const ImagePlan& plan) { return plan.coding.format != FileImage::kPng; }
 
@@ -77,11 +79,14 @@ void Filling::replace_if_larger(FilledFile&& file, FilledFile& best) const {
 
 void Filling::encode(Draft& draft, const std::vector<std::size_t>& images) const {
   draft.files.resize(draft.plans.size());
+  draft.coded.resize(draft.plans.size());
   parallel_for(reference_.context, images.size(), 1, [&](std::size_t begin, std::size_t end) {
     for (std::size_t k = begin; k < end; ++k) {
       const ImagePlan& plan = draft.plans[images[k]];
-      draft.files[images[k]] =
-          candidates_.encoded(images[k], draft.pixels[images[k]], plan.coding, plan.quality, false);
+      FileImageData& file = draft.files[images[k]];
+      if (!file.bytes.empty() && draft.coded[images[k]] == plan) continue;
+      file = candidates_.encoded(images[k], draft.pixels[images[k]], plan.coding, plan.quality, false);
+      draft.coded[images[k]] = plan;
     }
   });
 }
@@ -131,12 +136,14 @@ FilledFile Filling::file_of(const MeshFile& mesh, const Draft& draft) const {
 
 void Filling::by_level(double start, int tries, const std::function<FilledFile(double level)>& at,
                        FilledFile& best) const {
-  quality_for(static_cast<double>(bytes_), start, kNear, tries, [&](double level) {
-    FilledFile file = at(level);
-    const std::size_t bytes = file.glb.size();
-    replace_if_larger(std::move(file), best);
-    return bytes;
-  });
+  const bool fast = reference_.wishes.fast();
+  quality_for(static_cast<double>(bytes_), start, fast ? kFastNear : kNear, fast ? kFastTries : tries,
+              [&](double level) {
+                FilledFile file = at(level);
+                const std::size_t bytes = file.glb.size();
+                replace_if_larger(std::move(file), best);
+                return bytes;
+              });
 }
 
 /// Bytes that are left go into the source's own coefficients, of the images first that lose most.
@@ -235,7 +242,7 @@ FilledFile Filling::fill(const MeshFile& mesh, const DealtBytes& allocation) con
   if (fits(best)) by_source(mesh, allocation, draft, best);
   if (fills(best) || (fits(best) && best.has_sources)) return best;
   by_last_image(mesh, allocation.last, draft, best);
-  if (fills(best)) return best;
+  if (fills(best) || (fits(best) && reference_.wishes.fast())) return best;
   by_all_qualities(mesh, draft, best);
   if (!fills(best)) by_sizes(mesh, draft, best);
   if (fits(best) && !fills(best)) by_codings(mesh, draft, best);

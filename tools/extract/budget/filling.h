@@ -43,6 +43,7 @@ class Filling {
     std::vector<ImagePlan> plans;
     std::vector<Pixels> pixels;
     std::vector<FileImageData> files;
+    std::vector<ImagePlan> coded;  // what `files` were made by
   };
   Draft draft_of(const std::vector<ImagePlan>& plans) const;
   void encode(Draft& draft, const std::vector<std::size_t>& images) const;

@@ -189,7 +189,7 @@ std::vector<double> LitMeter::differences(const LitViews& views, const std::vect
 }
 
 Reference::Reference(PackageReader& from, const ExtractBudget& asked, const OutputTransform& placed,
-                     TextureSource& textures, const RunContext& run)
+                     TextureSource& textures, const RunContext& run, std::optional<int> shown_by)
     : package(from),
       wishes(asked),
       place(placed),
@@ -198,7 +198,7 @@ Reference::Reference(PackageReader& from, const ExtractBudget& asked, const Outp
       images(textures.images()) {
   context.progress = nullptr;
   if (wishes.fast()) {
-    use_tables();
+    use_tables(shown_by.value_or(package.manifest().scales.back().scale));
     return;
   }
   source = read_model(scale_file(package, 0, context), mesh_path(0), context);
@@ -210,22 +210,21 @@ Reference::Reference(PackageReader& from, const ExtractBudget& asked, const Outp
   find_groups();
   find_alike();
   finest = lit_mesh(source);
-  const LitViews views(finest, cameras, context);
-  measure_surface(views);
-  windows = side_px < 2 * kWindowPx ? cameras : windows_of(views, kWindowsPerView, kWindowPx);
+  finest_views = std::make_unique<LitViews>(finest, cameras, context);
+  measure_surface(*finest_views);
+  windows = side_px < 2 * kWindowPx ? cameras : windows_of(*finest_views, kWindowsPerView, kWindowPx);
   read_best_textures(textures);
   environment = studio_environment();
   finest_windows = std::make_unique<LitViews>(finest, windows, context);
   window_meter = std::make_unique<LitMeter>(*finest_windows, best_textures, environment, context);
-  whole_meter = std::make_unique<LitMeter>(views, best_textures, environment, context);
+  whole_meter = std::make_unique<LitMeter>(*finest_views, best_textures, environment, context);
 }
 
 /// What the package says of S_0 without it. The coarsest scale, which takes the least time, shows about the
 /// same texels.
-void Reference::use_tables() {
+void Reference::use_tables(int shown_by) {
   const Manifest& m = package.manifest();
-  const int coarsest = m.scales.back().scale;
-  source = read_model(scale_file(package, coarsest, context), mesh_path(coarsest), context);
+  source = read_model(scale_file(package, shown_by, context), mesh_path(shown_by), context);
   find_alike();
   finest.mesh = std::move(source.mesh);
   const Vec3d size = m.bounds_max - m.bounds_min;
@@ -332,17 +331,28 @@ double Reference::fewest_texels_per_pixel(std::size_t image) const {
 }
 
 void Reference::read_best_textures(TextureSource& textures) {
+  fewest_texels_.assign(images.size(), 0);
+  for (const PictureTexture& t : shown) fewest_texels_[t.image] = fewest_texels_per_pixel(t.image);
+  std::vector<std::uint32_t> unread;
+  for (std::size_t i = 0; i < images.size(); ++i)
+    unread.push_back(unread_levels(i, side_px / std::max<double>(wishes.display_px, side_px)));
+  textures.leave_unread(std::move(unread));
   for (std::size_t i = 0; i < images.size() && wishes.images != ExtractImages::kPng; ++i)
-    textures.set_shown(i, shown_texels(i, images[i].width_px, images[i].height_px));
+    if (textures.reads_whole(i))
+      textures.set_shown(i, shown_texels(i, images[i].width_px, images[i].height_px));
   for (const PictureTexture& t : shown) {
     const PackageImage& from = images[t.image];
     Pixels pixels = textures.texels(t.image, from.width_px, from.height_px, {}, 0);
     const double share = static_cast<double>(pixels.width_px) / from.width_px;
-    std::uint32_t skipped = 0;  // levels that no picture reads
-    for (double texels = fewest_texels_per_pixel(t.image) * share * share; texels > kFinestShown; texels /= 4)
-      ++skipped;
-    best_textures.push_back(render_texture(std::move(pixels), t.srgb, skipped, context));
+    best_textures.push_back(
+        render_texture(std::move(pixels), t.srgb, unread_levels(t.image, share), context));
   }
+}
+
+std::uint32_t Reference::unread_levels(std::size_t image, double share) const {
+  std::uint32_t out = 0;
+  for (double texels = fewest_texels_[image] * share * share; texels > kFinestShown; texels /= 4) ++out;
+  return out;
 }
 
 /// Which texels are shown takes a walk over all triangles: once a size for the images of an atlas.

@@ -84,10 +84,10 @@ struct PictureTexture {
 /// it is made, and does not depend on the number of bytes. With ExtractEffort::kFast it has no picture: no
 /// cameras, views and meters, and texels count as shown that the coarsest scale shows.
 struct Reference {
-  /// Reads the package's best from `textures`, which learns which of its texels are shown. StageError for S_0
-  /// without an extent.
+  /// Reads the package's best from `textures`, which learns which of its texels are shown. `shown_by`: with
+  /// kFast the scale whose texels count as shown, else the coarsest. StageError for S_0 without an extent.
   Reference(PackageReader& package, const ExtractBudget& wishes, const OutputTransform& place,
-            TextureSource& textures, const RunContext& context);
+            TextureSource& textures, const RunContext& context, std::optional<int> shown_by = {});
   Reference(const Reference&) = delete;  // meters and views point into it
   Reference& operator=(const Reference&) = delete;
 
@@ -96,6 +96,8 @@ struct Reference {
   /// The texels of an image that S_0 shows, as TexturePlane::coverage.
   std::vector<std::uint8_t> shown_texels(std::size_t image, std::uint32_t width_px,
                                          std::uint32_t height_px) const;
+  /// Levels of an image at a share of its sides that are finer than pictures read.
+  std::uint32_t unread_levels(std::size_t image, double share) const;
 
   PackageReader& package;
   const ExtractBudget wishes;  // but for its numbers of bytes
@@ -113,7 +115,7 @@ struct Reference {
   RenderEnvironment environment;
   LitMesh finest;
   std::vector<LitCamera> cameras, windows;  // of whole pictures, and of their parts
-  std::unique_ptr<const LitViews> finest_windows;
+  std::unique_ptr<const LitViews> finest_views, finest_windows;
   std::unique_ptr<const LitMeter> window_meter, whole_meter;
 
  private:
@@ -123,7 +125,7 @@ struct Reference {
     std::map<std::tuple<std::size_t, std::uint32_t, std::uint32_t>, std::vector<std::uint8_t>> bits;
   };
   std::int32_t shown_texture(const Model& model, const TextureRef& reference, TextureUse use) const;
-  void use_tables();
+  void use_tables(int shown_by);
   void find_textures();
   bool shows(const TextureRef& ref, std::size_t image) const;
   double fewest_texels_per_pixel(std::size_t image) const;
@@ -131,7 +133,8 @@ struct Reference {
   void find_alike();
   void measure_surface(const LitViews& views);
   void read_best_textures(TextureSource& textures);
-  std::vector<std::size_t> alike_;  // by image: the first that the same triangles show in the same way
+  std::vector<double> fewest_texels_;  // per pixel, by image at full size, where pictures show it
+  std::vector<std::size_t> alike_;     // by image: the first that the same triangles show in the same way
   std::unique_ptr<KnownTexels> known_texels_ = std::make_unique<KnownTexels>();
 };
 

@@ -83,10 +83,21 @@ std::vector<PackageImage> package_images(PackageReader& package) {
 }
 
 TextureSource::TextureSource(PackageReader& package, double most_texels, const RunContext& context,
-                             bool from_mips)
-    : package_(package), context_(context), images_(package_images(package)), from_mips_(from_mips) {
+                             ExtractEffort effort, double least_texels)
+    : package_(package),
+      context_(context),
+      images_(package_images(package)),
+      effort_(effort),
+      most_texels_(most_texels),
+      least_texels_(least_texels),
+      unread_(images_.size()) {
   context_.progress = nullptr;
-  first_level_ = halvings(most_texels);
+  cut_ = levels_cut(most_texels, least_texels);
+}
+
+void TextureSource::leave_unread(std::vector<std::uint32_t> levels) {
+  unread_ = std::move(levels);
+  cut_ = levels_cut(most_texels_, least_texels_);
 }
 
 void TextureSource::set_shown(std::size_t index, std::vector<std::uint8_t> coverage) {
@@ -96,30 +107,55 @@ void TextureSource::set_shown(std::size_t index, std::vector<std::uint8_t> cover
   shown_[image.plane] = std::move(coverage);
 }
 
-/// How often sides of colours are halved.
-std::uint32_t TextureSource::halvings(double most_texels) const {
+std::vector<std::uint32_t> TextureSource::levels_cut(double most_texels, double least_texels) const {
+  const auto texels_of = [](const PackageImage& i) { return static_cast<double>(i.width_px) * i.height_px; };
+  const bool fast = effort_ == ExtractEffort::kFast;
   double texels = 0;
   for (const PackageImage& i : images_)
-    if (i.colours || from_mips_) texels += static_cast<double>(i.width_px) * i.height_px;
+    if (i.colours || fast) texels += texels_of(i);
   std::uint32_t times = 0;
   for (; texels > most_texels && times < 20; texels /= 4) ++times;
-  return times;
+  std::vector<std::uint32_t> out;
+  for (const PackageImage& i : images_)
+    out.push_back(i.colours || fast ? times : effort_ == ExtractEffort::kUsual ? std::max(times, 1u) - 1 : 0);
+  if (effort_ != ExtractEffort::kUsual || unread_.empty()) return out;
+  for (std::uint32_t most = std::ranges::max(unread_); most > 0; --most) {
+    std::vector<std::uint32_t> cut = out;
+    texels = 0;
+    for (std::size_t i = 0; i < cut.size(); ++i) {
+      cut[i] = std::max(cut[i], std::min(most, unread_[i]));
+      texels += texels_of(images_[i]) / std::pow(4.0, cut[i]);
+    }
+    if (texels >= least_texels) return cut;
+  }
+  return out;
 }
 
-double TextureSource::largest_share(std::size_t index) {
-  return images_[index].colours || from_mips_ ? 1.0 / static_cast<double>(1u << first_level_) : 1.0;
+double TextureSource::largest_share(std::size_t index) const {
+  return 1.0 / static_cast<double>(1u << cut_[index]);
 }
 
-const std::vector<Pixels>& TextureSource::levels(std::uint32_t plane, bool colours, Averaging kind) {
+/// Of the package's planes of an image.
+std::uint32_t TextureSource::read_level(std::size_t index) const {
+  if (effort_ == ExtractEffort::kFast) return cut_[index];
+  return effort_ == ExtractEffort::kUsual ? std::max(cut_[index], 1u) - 1 : 0;
+}
+
+const std::vector<Pixels>& TextureSource::levels(std::size_t index, std::uint32_t plane, Averaging kind) {
   std::vector<Pixels>& levels = planes_[plane];
   if (!levels.empty()) return levels;
-  const std::uint32_t skip = colours || from_mips_ ? first_level_ : 0;
+  const std::uint32_t skip = cut_[index];
   const TextureInfo& info = package_.textures()[plane];
-  const std::uint32_t read = from_mips_ ? plane_at_level(package_.textures(), plane, skip) : plane;
+  const std::uint32_t read = plane_at_level(package_.textures(), plane, read_level(index));
   Pixels full = read_plane(package_, read, kBestRung, context_);
-  if (const auto shown = shown_.find(plane); shown != shown_.end())
+  if (const auto shown = shown_.find(plane); shown != shown_.end() && read == plane)
     fill_uncovered(full, shown->second, context_, PartBlocks::kSmooth);
-  if (skip > 0)
+  // As pictures read smaller copies of a whole texture: others would differ from the package's best.
+  const std::uint32_t halved = skip - package_.textures()[read].mip;
+  if (effort_ == ExtractEffort::kUsual && full.width_px % (1u << halved) == 0 &&
+      full.height_px % (1u << halved) == 0)
+    full = coarser_level(std::move(full), kind == Averaging::kLight, halved, context_);
+  else if (skip > 0)
     full = reduced(full, full.width_px, full.height_px, half_of(info.width_px, skip),
                    half_of(info.height_px, skip), kind);
   levels.push_back(std::move(full));
@@ -135,7 +171,7 @@ Pixels TextureSource::plane_texels(std::size_t index, std::uint32_t base, std::u
                                    std::uint32_t height_px, const std::vector<std::uint8_t>& coverage,
                                    float sharpening) {
   const Averaging kind = base == images_[index].plane ? images_[index].averaging() : Averaging::kNumbers;
-  const std::vector<Pixels>& from = levels(base, images_[index].colours, kind);
+  const std::vector<Pixels>& from = levels(index, base, kind);
   std::size_t level = 0;  // the smallest that is twice as large: averaging it again costs no sharpness
   while (level + 1 < from.size() && from[level + 1].width_px >= 2 * width_px &&
          from[level + 1].height_px >= 2 * height_px)

@@ -27,10 +27,11 @@ std::vector<PackageImage> package_images(PackageReader& package);
 /// the size that `most_texels` (over all colour images) allows.
 class TextureSource {
  public:
-  /// `from_mips`: images that are cut down are read from the package's own smaller planes, which takes less
-  /// time and shows a little of their coding; numbers are cut down as colours are.
+  /// kBest cuts down colours alone. kUsual cuts numbers down, too, half as far, and reads the package's own
+  /// planes of twice the sides; kFast as far, and reads planes of those sides, which show a little of their
+  /// coding. `least_texels`: see leave_unread().
   TextureSource(PackageReader& package, double most_texels, const RunContext& context,
-                bool from_mips = false);
+                ExtractEffort effort = ExtractEffort::kBest, double least_texels = 0);
   const std::vector<PackageImage>& images() const { return images_; }
   /// An image with these sides, of 1, 3 or, where the image has alpha, 4 channels. Sides are at least 1 and
   /// at most the image's; where memory is bounded, larger sides are cut down, see largest_share(). `coverage`
@@ -38,25 +39,34 @@ class TextureSource {
   /// made cheap to code. `sharpening` (see reduced()) is for colours alone.
   Pixels texels(std::size_t index, std::uint32_t width_px, std::uint32_t height_px,
                 const std::vector<std::uint8_t>& coverage, float sharpening = kSharpening);
+  /// Before texels are asked for: levels by image that are finer than what pictures read. Images are cut down
+  /// by as many, as long as all of them have `least_texels` together. With kUsual alone.
+  void leave_unread(std::vector<std::uint32_t> levels);
+  /// Whether set_shown() matters: the image is read at full size.
+  bool reads_whole(std::size_t index) const { return read_level(index) == 0; }
   /// Says which texels of an image at full size are shown, before any are asked for. Blocks of 8 x 8 without
   /// one, of which packages hold nothing true, are filled smoothly before smaller copies are made: those
   /// would take them in at the borders of charts.
   void set_shown(std::size_t index, std::vector<std::uint8_t> coverage);
   /// Largest share of an image's sides, 0 .. 1, that texels() gives.
-  double largest_share(std::size_t index);
-  /// Whether a source that allows so many texels gives the same ones.
-  bool serves(double most_texels) const { return halvings(most_texels) == first_level_; }
+  double largest_share(std::size_t index) const;
+  /// Whether a source with these bounds gives the same texels.
+  bool serves(double most_texels, double least_texels) const {
+    return levels_cut(most_texels, least_texels) == cut_;
+  }
 
  private:
-  std::uint32_t halvings(double most_texels) const;
-  const std::vector<Pixels>& levels(std::uint32_t plane, bool colours, Averaging kind);
+  std::vector<std::uint32_t> levels_cut(double most_texels, double least_texels) const;
+  std::uint32_t read_level(std::size_t index) const;
+  const std::vector<Pixels>& levels(std::size_t index, std::uint32_t plane, Averaging kind);
   Pixels plane_texels(std::size_t index, std::uint32_t base, std::uint32_t width_px, std::uint32_t height_px,
                       const std::vector<std::uint8_t>& coverage, float sharpening);
   PackageReader& package_;
   RunContext context_;
   std::vector<PackageImage> images_;
-  bool from_mips_;
-  std::uint32_t first_level_ = 0;                             // of colour planes: how often sides are halved
+  ExtractEffort effort_;
+  double most_texels_, least_texels_;
+  std::vector<std::uint32_t> unread_, cut_;                   // by image: how often sides are halved
   std::map<std::uint32_t, std::vector<std::uint8_t>> shown_;  // by plane
   std::map<std::uint32_t, std::vector<Pixels>> planes_;       // by plane: halves, halves of them ..
 };

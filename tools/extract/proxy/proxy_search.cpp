@@ -315,9 +315,12 @@ constexpr double kMostMesh = 0.7;  // of the bytes, of the mesh that is tried fi
 constexpr double kShareStep = 0.75, kLeastProxyShare = 0.15;
 constexpr double kPoorQuality = 15;  // pictures get smaller before they get worse
 constexpr double kNormalQualityAbove = 10, kDataQualityBelow = 5;  // as the stage codes them
-constexpr int kQualityTries = 10;
-constexpr double kNearlyAll = 0.99;
-constexpr std::uint64_t kFarBelow = 4;  // times as many bytes look better without a proxy
+constexpr int kQualityTries = 10, kQuickTries = 4;
+constexpr double kNearlyAll = 0.99, kRoughly = 0.96;
+constexpr double kTableErrs = 1.15;     // times what the package tells of a proxy's difference, at most
+constexpr double kSmallerLoses = 0.35;  // a file of half the bytes differs 2 to this power times as much
+constexpr std::uint64_t kFewBytesOfProxy = 50000;  // two proxies are made smaller, else one
+constexpr std::uint64_t kFarBelow = 4;             // times as many bytes look better without a proxy
 
 /// A way to make a file of a proxy.
 struct ProxyTrial {
@@ -336,25 +339,31 @@ class ProxySearch {
               Extracted& found)
       : reference_(reference), bytes_(bytes), whole_(whole), best_(found) {}
 
+  /// Those that fit from the largest on, then the others from the smallest on. But with --best tables pass
+  /// over those that are likely to look worse, and few are made smaller.
   void run() {
-    const auto count = static_cast<std::uint32_t>(reference_.package.manifest().proxies.size());
-    for (std::uint32_t k = 0; k < count; ++k) {
-      Extracted whole = extract_proxy(reference_.package, {k}, reference_.place, reference_.context, bytes_);
-      if (!reference_.wishes.best() && kFarBelow * whole.glb.size() < bytes_) continue;
-      measure_whole(k, whole);
-      if (reference_.wishes.fast()) {
-        if (fits(whole) && is_wanted_kind(k))
-          offer(std::move(whole));
-        else if (!fits(best_))
-          offer_smaller(k, whole);
+    const std::vector<ManifestProxy>& proxies = reference_.package.manifest().proxies;
+    const auto fitting = static_cast<std::uint32_t>(
+        std::ranges::count_if(proxies, [&](const ManifestProxy& p) { return p.glb.bytes <= bytes_; }));
+    int made_smaller = 0;
+    for (std::uint32_t i = 0; i < proxies.size(); ++i) {
+      const std::uint32_t k = i < fitting ? fitting - 1 - i : i;
+      const bool best = reference_.wishes.best();
+      if (!best && (kFarBelow * proxies[k].glb.bytes < bytes_ || !may_look_better(k) ||
+                    made_smaller == (bytes_ < kFewBytesOfProxy ? 2 : 1)))
         continue;
-      }
-      if (!is_wanted_kind(k))
-        offer_smaller(k, whole);
-      else if (fits(whole) || !(whole.difference < best_.difference || !fits(best_)))
-        offer(std::move(whole));  // what is made of it looks no better
+      Extracted whole = extract_proxy(reference_.package, {k}, reference_.place, reference_.context, bytes_);
+      const bool is_file = fits(whole) && is_wanted_kind(k);
+      if (best || is_file)
+        measure_whole(k, whole);
       else
+        set_difference(table_flip(k), whole);
+      if (is_file || (best && is_wanted_kind(k) && !(whole.difference < best_.difference || !fits(best_)))) {
+        offer(std::move(whole));  // what is made of it looks no better
+      } else if (!reference_.wishes.fast() || !fits(best_)) {
         offer_smaller(k, whole);
+        ++made_smaller;
+      }
     }
   }
 
@@ -378,9 +387,20 @@ class ProxySearch {
                                [&](const auto& image) { return image.value("mimeType", "") == mime; });
   }
 
+  double table_flip(std::uint32_t proxy) const {
+    return proxy_loss(reference_.package.manifest(), proxy, reference_.side_px).flip;
+  }
+  /// By the package's tables.
+  bool may_look_better(std::uint32_t proxy) const {
+    const double times = static_cast<double>(reference_.package.manifest().proxies[proxy].glb.bytes) /
+                         static_cast<double>(bytes_);
+    const double likely =
+        table_flip(proxy) * (times > 1 ? portable::pow(times, kSmallerLoses) : 1 / kTableErrs);
+    return !fits(best_) || likely < best_.difference;
+  }
+
   void measure_whole(std::uint32_t proxy, Extracted& file) {
-    if (reference_.wishes.fast())
-      return set_difference(proxy_loss(reference_.package.manifest(), proxy, reference_.side_px).flip, file);
+    if (reference_.wishes.fast()) return set_difference(table_flip(proxy), file);
     if (const auto known = whole_.find(proxy); known != whole_.end())
       return set_difference(known->second, file);
     measure(reference_.package.proxy_glb(proxy), file);
@@ -416,18 +436,26 @@ class ProxySearch {
     best_ = std::move(file);
   }
 
+  ProxyTrial first_trial(const ProxyParts& parts, const Extracted& whole) {
+    ProxyTrial trial;
+    trial.format = format_of(reference_.wishes.images);
+    const auto bytes = static_cast<double>(bytes_);
+    while (trial.mesh + 1 < parts.mesh_count() &&
+           static_cast<double>(coded(parts, trial).finish().size()) > kMostMesh * bytes)
+      ++trial.mesh;
+    if (!reference_.wishes.best())  // about as many texels for a byte as the proxy has
+      while (trial.share * trial.share * kShareStep * static_cast<double>(whole.glb.size()) > bytes)
+        trial.share *= kShareStep;
+    return trial;
+  }
+
   /// From the usual way to the best one, one choice after the other, as long as the picture gets better.
   void offer_smaller(std::uint32_t proxy, const Extracted& whole) {
     const auto parts =
         ProxyParts::read(reference_.package.proxy_glb(proxy), proxy_path(proxy), reference_.context);
     if (!parts) return;
     files_.clear();
-    ProxyTrial trial;
-    trial.format = format_of(reference_.wishes.images);
-    const double most = kMostMesh * static_cast<double>(bytes_);
-    while (trial.mesh + 1 < parts->mesh_count() &&
-           static_cast<double>(coded(*parts, trial).finish().size()) > most)
-      ++trial.mesh;
+    ProxyTrial trial = first_trial(*parts, whole);
     const bool best = reference_.wishes.best();
     Extracted file = whole;
     while (!make(*parts, trial, file, best) && trial.share * kShareStep > kLeastProxyShare)
@@ -438,8 +466,8 @@ class ProxySearch {
       if (std::ranges::find(seen, next) != seen.end()) return false;
       seen.push_back(next);
       Extracted other = whole;
-      make(*parts, next, other, best);
-      if (!better(other, file)) return false;
+      const bool poor = !make(*parts, next, other, best);
+      if ((poor && !best) || !better(other, file)) return false;
       file = std::move(other);
       trial = next;
       return true;
@@ -505,21 +533,24 @@ class ProxySearch {
     return std::clamp(quality, kLowestQuality, kHighestQuality);
   }
 
-  /// The pictures at a quality, and the report's rows of them.
-  std::map<std::uint32_t, FileImageData> pictures(const std::vector<ProxyMap>& maps, const ProxyTrial& trial,
-                                                  double quality, std::vector<ExtractedImage>& rows) const {
-    std::map<std::uint32_t, FileImageData> out;
-    rows.clear();
+  struct Pictures {
+    std::map<std::uint32_t, FileImageData> files;
+    std::vector<ExtractedImage> rows;  // of the report
+  };
+
+  Pictures pictures(const std::vector<ProxyMap>& maps, const ProxyTrial& trial, double quality,
+                    bool quick) const {
+    Pictures out;
     for (const ProxyMap& map : maps) {
-      const auto k = static_cast<std::uint32_t>(rows.size());
+      const auto k = static_cast<std::uint32_t>(out.rows.size());
       const FileImage format = map.pixels.channels < 4                            ? trial.format
                                : reference_.wishes.images == ExtractImages::kJpeg ? FileImage::kPng
                                                                                   : trial.format;
       const double q = quality_of(map, quality);
       const bool numbers = map.averaging() != Averaging::kLight;
-      out[k] = {format, encode_image(map.pixels, {format, q, numbers, false, true})};
-      rows.push_back(
-          {k, map.role(), format, map.pixels.width_px, map.pixels.height_px, q, out[k].bytes.size()});
+      out.files[k] = {format, encode_image(map.pixels, {format, q, numbers, quick, true})};
+      out.rows.push_back(
+          {k, map.role(), format, map.pixels.width_px, map.pixels.height_px, q, out.files[k].bytes.size()});
     }
     return out;
   }
@@ -532,19 +563,31 @@ class ProxySearch {
     whole.set_about(reserved_about(reference_.package.about(), reference_.place, bytes_));
     std::vector<ProxyMap> maps = parts.maps(trial.maps);
     for (ProxyMap& map : maps) map.pixels = smaller_map(map, trial.share);
-    std::map<double, Bytes> files;
+    double texels = 1;
+    for (const ProxyMap& map : maps)
+      texels += static_cast<double>(map.pixels.width_px) * map.pixels.height_px;
+    const bool quick = !in_whole && !reference_.wishes.fast();
+    std::map<double, Pictures> made;
     const auto file_at = [&](double quality) {
-      whole.set_images(pictures(maps, trial, quality, out.images));
-      return files[quality] = whole.finish();
+      Pictures& p = made[quality];
+      if (p.files.empty()) p = pictures(maps, trial, quality, quick);
+      whole.set_images(p.files);
+      return whole.finish();
     };
-    const double best = maps.empty() ? kHighestQuality
-                                     : quality_for(static_cast<double>(bytes_), 50, kNearlyAll, kQualityTries,
-                                                   [&](double q) { return file_at(q).size(); });
-    draft.set_images(pictures(maps, trial, best, out.images));
-    out.glb = files.contains(best) ? files[best] : file_at(best);
+    double start = 50;  // bytes of a texel grow about as exp(quality / 30)
+    if (quick && known_texels_ > 0) start = known_quality_ + 30 * portable::log(known_texels_ / texels);
+    const double best =
+        maps.empty()
+            ? kHighestQuality
+            : quality_for(static_cast<double>(bytes_), start, quick ? kRoughly : kNearlyAll,
+                          quick ? kQuickTries : kQualityTries, [&](double q) { return file_at(q).size(); });
+    out.glb = file_at(best);
+    draft.set_images(made[best].files);
+    out.images = made[best].rows;
     out.mesh_bytes = out.glb.size();
     out.triangles = parts.triangles(trial.mesh);
     for (const ExtractedImage& i : out.images) out.mesh_bytes -= i.bytes;
+    if (quick) known_quality_ = best, known_texels_ = texels;
     if (!fits(out)) return false;
     if (!reference_.wishes.fast()) measure(draft.finish(), out, in_whole);
     return best >= kPoorQuality;
@@ -554,6 +597,7 @@ class ProxySearch {
   const std::uint64_t bytes_;
   std::map<std::uint32_t, double>& whole_;
   Extracted& best_;
+  double known_quality_ = 50, known_texels_ = 0;  // of the last file that was looked at in windows
   std::map<std::tuple<bool, bool, std::size_t, int>, StandaloneGlb> files_;  // of one proxy: maps, mesh, bits
 };
 

@@ -191,7 +191,7 @@ ExtractScale::Form form_of(const ExportOptions& options) {
 void add_glb(Export& made, Extracted extracted, const std::string& path) {
   for (const std::string& note : extracted.notes)
     if (std::ranges::find(made.notes, note) == made.notes.end()) made.notes.push_back(note);
-  if (!extracted.within) made.notes.push_back("no GLB comes within 2 % below the bytes asked for");
+  if (!extracted.within) made.notes.push_back("no GLB comes below the bytes asked for");
   made.files.push_back({path, std::move(extracted.glb)});
 }
 
