@@ -307,12 +307,41 @@ class ModelGraph {
   GraphRun graph_;  // refers to stages_, which therefore stands first
 };
 
+CompileOptions options_with_atlas(CompileOptions options, AtlasMode mode) {
+  options.atlas.mode = mode;
+  return resolve_options(std::move(options));
+}
+
+/// How the source's charts look, or new ones.
+AtlasSample sample_with(AtlasMode mode, const CompileOptions& resolved, ModelSource& source, Store& store,
+                        const RunContext& context, const StageObserver& observer) {
+  const CompileOptions options = options_with_atlas(resolved, mode);
+  ModelGraph graph(source, graph_towards(atlas_choice_stage(options), options), options, store, context,
+                   observer);
+  return *graph->run(kAtlasSample);
+}
+
+/// Options with keep or rebuild where they have auto. The package is the one of that mode. What was found
+/// stands in the store, and so do the results that the package is made from.
+CompileOptions with_chosen_atlas(CompileOptions options, ModelSource& source, Store& store,
+                                 const RunContext& context, const StageObserver& observer, Notes& notes) {
+  if (options.atlas.mode != AtlasMode::kAuto) return options;
+  const auto sample = [&](AtlasMode mode) {
+    return sample_with(mode, options, source, store, context, observer);
+  };
+  const AtlasSample kept = sample(AtlasMode::kKeep);
+  const AtlasChoice choice = choose_atlas(kept, kept.good.empty() ? sample(AtlasMode::kRebuild) : kept);
+  add_info(notes, "atlas-chosen", "", choice.why);
+  return options_with_atlas(std::move(options), choice.rebuild ? AtlasMode::kRebuild : AtlasMode::kKeep);
+}
+
 CompileOutcome compile_source(const CompileRequest& request, const CompileOptions& resolved,
                               ModelSource& source, Store& store, const RunContext& context,
                               const StageObserver& observer) {
   source.open(store, context, true);
   Notes notes;
-  const CompileOptions options = with_archived_notes(resolved, source, notes);
+  const CompileOptions options = with_archived_notes(
+      with_chosen_atlas(resolved, source, store, context, observer, notes), source, notes);
   ModelGraph graph(source, stage_table(options), options, store, context, observer);
   graph->explain(request.earlier_keys, request.explainer);
   const std::shared_ptr<const Bytes> package = graph->run(kPackage);
@@ -354,9 +383,11 @@ CompileOutcome compile_model(const CompileRequest& request, Store& store, const 
 
 void run_towards(const CompileRequest& request, Stage last, Store& store, const RunContext& context,
                  const StageObserver& observer, const std::function<void(GraphRun&)>& use) {
-  const CompileOptions options = resolve_options(request.options);
   ModelSource source(request);
   source.open(store, context, true);
+  Notes unused;
+  const CompileOptions options =
+      with_chosen_atlas(resolve_options(request.options), source, store, context, observer, unused);
   ModelGraph graph(source, graph_towards(std::move(last), options), options, store, context, observer);
   use(*graph);
 }
@@ -366,14 +397,29 @@ std::vector<StageForecast> forecast_model(const CompileRequest& request, Store& 
   CompileOptions options = resolve_options(request.options);
   ModelSource source(request);
   source.open(store, context, false);
+  const auto forecasts_of = [&](ModelGraph& graph) {
+    graph->explain(request.earlier_keys, {});
+    std::vector<StageForecast> forecasts;
+    for (auto& [stage, explanation] : graph->forecast())
+      forecasts.push_back({stage->name, std::move(explanation)});
+    return forecasts;
+  };
+  // Before auto's choice is in the store nobody knows what follows.
+  for (const AtlasMode mode : {AtlasMode::kKeep, AtlasMode::kRebuild}) {
+    if (options.atlas.mode != AtlasMode::kAuto) break;
+    const CompileOptions looked_at = options_with_atlas(options, mode);
+    ModelGraph graph(source, graph_towards(atlas_choice_stage(looked_at), looked_at), looked_at, store,
+                     context, {});
+    std::vector<StageForecast> forecasts = forecasts_of(graph);
+    for (const StageForecast& f : forecasts)
+      if (f.explanation.verdict != StageVerdict::kHit) return forecasts;
+    if (!sample_with(mode, options, source, store, context, {}).good.empty()) break;
+  }
   Notes unused;
-  options = with_archived_notes(std::move(options), source, unused);
+  options = with_archived_notes(with_chosen_atlas(std::move(options), source, store, context, {}, unused),
+                                source, unused);
   ModelGraph graph(source, stage_table(options), options, store, context, {});
-  graph->explain(request.earlier_keys, {});
-  std::vector<StageForecast> forecasts;
-  for (auto& [stage, explanation] : graph->forecast())
-    forecasts.push_back({stage->name, std::move(explanation)});
-  return forecasts;
+  return forecasts_of(graph);
 }
 
 }  // namespace texmesh

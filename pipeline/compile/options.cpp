@@ -149,7 +149,6 @@ CompileOptions resolve_options(CompileOptions o) {
   const auto is_default = [&](const char* path, const auto& value, const auto& fallback) {
     return value == fallback && !o.set_by_user.contains(path);
   };
-  if (o.atlas.mode == AtlasMode::kAuto) o.atlas.mode = AtlasMode::kKeep;  // docs/decisions/atlas.md
   if (o.ladder.mode == LadderMode::kProgressive &&
       is_default("fragmentation.min_fragment_px", o.fragmentation.min_fragment_px,
                  FragmentationOptions{}.min_fragment_px))
@@ -295,7 +294,17 @@ std::string profile_file(const std::string& wanted) {
                    known.empty() ? "none" : known);
 }
 
-std::string write_profile(const CompileOptions& options) { return profile_json(options).dump(); }
+std::string write_profile(const CompileOptions& options) {
+  if (options.atlas.mode != AtlasMode::kAuto) return profile_json(options).dump();
+  CompileOptions chosen = options, defaults;
+  const std::vector<OptionField> usual = list_options(defaults);
+  Json root{{"version", 1}};
+  for (std::size_t i = 0; const OptionField& f : list_options(chosen))
+    if (Json value = option_json(f);
+        value != option_json(usual[i++]) || options.set_by_user.contains(f.path()))
+      root[f.stage][f.name] = std::move(value);
+  return root.dump();
+}
 
 Json profile_json(const CompileOptions& options) {
   CompileOptions copy = options;

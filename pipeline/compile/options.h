@@ -5,6 +5,7 @@
 #include "pipeline/graph/stage.h"
 #include "pipeline/import/import.h"
 #include "stages/atlas/atlas.h"
+#include "stages/atlas_choice/atlas_choice.h"
 #include "stages/condition/condition.h"
 #include "stages/fragmentation/fragmentation.h"
 #include "stages/ladder/ladder.h"
@@ -138,7 +139,8 @@ void apply_profile(CompileOptions& options, const Json& profile, const std::stri
 /// InputError with the names that there are.
 std::string profile_file(const std::string& wanted);
 
-/// Every option as a profile. Of resolved options: what provenance records, and what a worker gets.
+/// Every option as a profile. Of resolved options: what provenance records, and what a worker gets. With
+/// atlas.mode auto write_profile() leaves out defaults that nobody has set, since the choice may change them.
 std::string write_profile(const CompileOptions& options);
 Json profile_json(const CompileOptions& options);
 

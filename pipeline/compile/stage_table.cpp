@@ -138,6 +138,11 @@ Stage atlas_stage(const CompileOptions& o) {
                chart_import);
 }
 
+AtlasSample sample_source(const ConditionedMesh& mesh, const Materials& materials, const Images& images,
+                          const NestedScales& scales, const Proxies& proxies, const RunContext& context) {
+  return with_proxies(sample_atlas(mesh, materials, images, scales, materials, images, context), proxies);
+}
+
 /// The stages with that of the atlas behind condition, unless the source's is kept.
 std::vector<Stage> with_atlas(std::vector<Stage> table, const CompileOptions& o) {
   if (o.atlas.mode != AtlasMode::kKeep)
@@ -230,6 +235,17 @@ std::vector<Stage> stage_table(const CompileOptions& o) {
       package_stage(o),
   };
   return with_atlas(std::move(table), o);
+}
+
+Stage atlas_choice_stage(const CompileOptions& o) {
+  const StageTitle title{"atlas_choice", kAtlasChoiceVersion,
+                         "source, nested scales -> lit pictures for the bytes of loads", .05};
+  if (o.atlas.mode == AtlasMode::kKeep)
+    return stage(title, inputs(kConditionedMesh, kMaterials, kImages, kNestedScales, kProxies),
+                 outputs(kAtlasSample), Options<>{}, kImageLibraries, sample_source);
+  return stage(
+      title, inputs(kConditionedMesh, kMaterials, kImages, kNestedScales, kChartedMaterials, kChartedImages),
+      outputs(kAtlasSample), Options<>{}, kImageLibraries, sample_atlas);
 }
 
 const std::vector<Stage>& default_stage_table() {

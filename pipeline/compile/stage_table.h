@@ -33,6 +33,7 @@ inline constexpr Artefact<ConditionedMesh> kConditionedMesh{"condition"};
 inline constexpr Artefact<ConditionedMesh> kChartedMesh{"atlas.mesh"};
 inline constexpr Artefact<std::vector<Material>> kChartedMaterials{"atlas.materials"};
 inline constexpr Artefact<std::vector<Image>> kChartedImages{"atlas.images"};
+inline constexpr Artefact<AtlasSample> kAtlasSample{"atlas_choice"};
 inline constexpr Artefact<Skeleton> kSkeleton{"skeletonization"};
 inline constexpr Artefact<ScaleMap> kScaleMap{"ssf"};
 inline constexpr Artefact<NestedScales> kNestedScales{"simplification"};
@@ -55,6 +56,10 @@ inline constexpr Artefact<Bytes> kPackage{"package"};
 /// input stands before its use. stage_table.cpp is the one place where the graph can be read. With atlas.mode
 /// keep there is no stage of that name, and the later ones read what import and condition made.
 std::vector<Stage> stage_table(const CompileOptions& options);
+
+/// Looks at what is shown with the charts of these options beside the source. It stands in no graph of a
+/// package: whoever asks for atlas.mode auto compares what it finds with keep and with rebuild.
+Stage atlas_choice_stage(const CompileOptions& options);
 
 /// The graph with default options: for those who ask for names, versions and inputs.
 const std::vector<Stage>& default_stage_table();

@@ -13,21 +13,6 @@ namespace {
 constexpr int kLeastQuality = 75, kMostQuality = 97;  // of a JPEG
 constexpr int kPngLevel = 1;                          // the files are read once, by the stages that follow
 
-/// Triangles that share wedges at an edge lie in one chart.
-std::size_t count_charts(const Mesh& mesh) {
-  DisjointSets sets(mesh.wedge_count());
-  std::vector<std::uint8_t> used(mesh.wedge_count(), 0);
-  for (const Triangle& t : mesh.triangles) {
-    sets.join(t[0], t[1]);
-    sets.join(t[1], t[2]);
-    for (const std::uint32_t w : t) used[w] = 1;
-  }
-  std::size_t count = 0;
-  for (std::uint32_t w = 0; w < used.size(); ++w)
-    if (used[w] && sets.find(w) == w) ++count;
-  return count;
-}
-
 ChartedModel kept(const ConditionedMesh& mesh, const std::vector<Material>& materials,
                   const std::vector<Image>& images, const std::string& reason) {
   ChartedModel out{mesh, materials, images, {}};

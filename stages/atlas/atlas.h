@@ -6,7 +6,7 @@ namespace texmesh {
 
 inline constexpr int kAtlasVersion = 1;
 
-/// Whose charts the package has: the source's or new ones. Whoever makes options resolves kAuto.
+/// Whose charts the package has: the source's or new ones. compile_model() decides for kAuto (atlas_choice).
 enum class AtlasMode : std::uint8_t { kKeep, kRebuild, kAuto };
 template <>
 struct EnumNames<AtlasMode> {
@@ -19,7 +19,7 @@ struct AtlasOptions {
   static void fields(auto& s, auto&& v) {
     v("mode", s.mode,
       "keep = the source's charts and textures; rebuild = few large charts, whose texels are read from the "
-      "source's; auto = keep: no measure tells yet which sources would gain");
+      "source's; auto = rebuild where lit pictures of 200 kB to 1 MB then look better, else keep");
     v("density", s.density, Range{0.25, 2}, ProfileOnly{},
       "texels of a rebuilt atlas along a line on the surface, by those that the source has there");
   }

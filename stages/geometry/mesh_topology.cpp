@@ -314,4 +314,18 @@ void weld_rounded_wedges(const Mesh& mesh, const std::vector<std::uint32_t>& exa
   follow(wedge_weld);
 }
 
+std::size_t count_charts(const Mesh& mesh) {
+  DisjointSets sets(mesh.wedge_count());
+  std::vector<std::uint8_t> used(mesh.wedge_count(), 0);
+  for (const Triangle& t : mesh.triangles) {
+    sets.join(t[0], t[1]);
+    sets.join(t[1], t[2]);
+    for (const std::uint32_t w : t) used[w] = 1;
+  }
+  std::size_t count = 0;
+  for (std::uint32_t w = 0; w < used.size(); ++w)
+    if (used[w] && sets.find(w) == w) ++count;
+  return count;
+}
+
 }  // namespace texmesh

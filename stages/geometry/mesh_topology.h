@@ -96,4 +96,7 @@ inline std::vector<Box3f> component_boxes(const std::vector<std::uint32_t>& comp
   return boxes;
 }
 
+/// Charts: triangles that share a wedge lie in one.
+std::size_t count_charts(const Mesh& mesh);
+
 }  // namespace texmesh

@@ -3,6 +3,7 @@
 #include <optional>
 
 #include "stages/base/parallel.h"
+#include "stages/image/decode_image.h"
 #include "stages/render/render_math.h"
 
 namespace texmesh {
@@ -132,6 +133,26 @@ RenderTexture texture_of(const Fragments& fragments, const std::vector<Pixels>& 
   put_plane(plane, pixels.at(pair.colours), 0, colours, image);
   if (pair.alpha) put_plane(fragments.planes[*pair.alpha], pixels.at(*pair.alpha), colours, 1, image);
   return render_texture(std::move(image), use.srgb, 0, context);
+}
+
+/// Materials with the textures that `make` makes of the images that `is_there`.
+ShownMaterials shown_with(const std::vector<Material>& materials, const Mesh& mesh,
+                          const std::function<bool(std::uint32_t image)>& is_there,
+                          const std::function<RenderTexture(const ImageUse&)>& make) {
+  ShownMaterials out;
+  std::vector<ImageUse> uses;
+  const auto index_of = [&](const TextureRef& ref, TextureUse use) -> std::int32_t {
+    const std::vector<Vec2f>& uv = ref.texcoord == 0 ? mesh.uv0 : mesh.uv1;
+    const ImageUse wanted{static_cast<std::uint32_t>(ref.image), is_srgb(use)};
+    if (ref.texcoord > 1 || uv.empty() || !is_there(wanted.image)) return -1;
+    const auto found = std::find(uses.begin(), uses.end(), wanted);
+    const auto index = static_cast<std::int32_t>(found - uses.begin());
+    if (found == uses.end()) uses.push_back(wanted);
+    return index;
+  };
+  for (const Material& m : materials) out.materials.push_back(render_material(m, index_of));
+  for (const ImageUse& use : uses) out.textures.push_back(make(use));
+  return out;
 }
 
 using ByteCurve = std::array<float, 256>;
@@ -350,24 +371,22 @@ ShownMaterials shown_materials(const std::vector<Material>& materials, const Fra
   if (pixels.size() != fragments.planes.size())
     throw StageError("render", "planes of pixels", std::to_string(fragments.planes.size()),
                      std::to_string(pixels.size()));
-  ShownMaterials out;
-  std::vector<ImageUse> uses;
-  const auto index_of = [&](const TextureRef& ref, TextureUse use) -> std::int32_t {
-    const std::vector<Vec2f>& uv = ref.texcoord == 0 ? mesh.uv0 : mesh.uv1;
-    const ImageUse wanted{static_cast<std::uint32_t>(ref.image), is_srgb(use)};
-    if (ref.texcoord > 1 || uv.empty() || !plane_of(fragments, wanted.image, false, 0)) return -1;
-    const auto found = std::find(uses.begin(), uses.end(), wanted);
-    const auto index = static_cast<std::int32_t>(found - uses.begin());
-    if (found == uses.end()) uses.push_back(wanted);
-    return index;
-  };
-  for (const Material& m : materials) out.materials.push_back(render_material(m, index_of));
-  // The picture is much smaller than textures are. Samplers without mips would show noise.
-  for (RenderMaterial& m : out.materials)
-    for (TextureSlot& slot : m.textures) slot.min_filter = MinFilter::kTrilinear;
-  for (const ImageUse& use : uses)
-    out.textures.push_back(texture_of(fragments, pixels, use, least_side_px, context));
-  return out;
+  return shown_with(
+      materials, mesh, [&](std::uint32_t image) { return plane_of(fragments, image, false, 0).has_value(); },
+      [&](const ImageUse& use) { return texture_of(fragments, pixels, use, least_side_px, context); });
+}
+
+ShownMaterials shown_materials(const std::vector<Material>& materials, const std::vector<Image>& images,
+                               const Mesh& mesh, std::uint32_t least_side_px, const RunContext& context) {
+  return shown_with(
+      materials, mesh, [&](std::uint32_t image) { return image < images.size(); },
+      [&](const ImageUse& use) {
+        const Image& image = images[use.image];
+        std::uint32_t level = 0;
+        while (std::max(image.width_px, image.height_px) >> (level + 1) >= least_side_px) ++level;
+        return render_texture(decode_image(image, use.srgb ? FloatEncoding::kSrgb : FloatEncoding::kAsIs),
+                              use.srgb, level, context);
+      });
 }
 
 }  // namespace texmesh

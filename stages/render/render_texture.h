@@ -90,5 +90,9 @@ struct ShownMaterials {
 ShownMaterials shown_materials(const std::vector<Material>& materials, const Fragments& fragments,
                                const std::vector<Pixels>& pixels, const Mesh& mesh,
                                std::uint32_t least_side_px, const RunContext& context);
+/// The same of whole images, whose finer mips are not kept, read as their samplers say. InputError for an
+/// image that does not decode.
+ShownMaterials shown_materials(const std::vector<Material>& materials, const std::vector<Image>& images,
+                               const Mesh& mesh, std::uint32_t least_side_px, const RunContext& context);
 
 }  // namespace texmesh

@@ -45,6 +45,8 @@ std::size_t affordable(const std::vector<RenderTexture>& textures, double bytes,
   }
 }
 
+}  // namespace
+
 std::vector<RenderTexture> without_finest(const std::vector<RenderTexture>& textures, std::size_t dropped) {
   std::vector<RenderTexture> out;
   for (const RenderTexture& t : textures) {
@@ -57,8 +59,6 @@ std::vector<RenderTexture> without_finest(const std::vector<RenderTexture>& text
   }
   return out;
 }
-
-}  // namespace
 
 std::uint32_t enough_side_px(const std::vector<Material>& materials) {
   std::size_t used = 0;

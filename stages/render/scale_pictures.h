@@ -30,6 +30,9 @@ FlipSum picture_loss(const ReferenceViews& reference, const RenderScene& scene,
                      const std::vector<RenderTexture>& textures, const RunContext& context,
                      double hopeless = 1);
 
+/// Textures without so many of their finest levels; of each at least one stays.
+std::vector<RenderTexture> without_finest(const std::vector<RenderTexture>& textures, std::size_t dropped);
+
 /// What bytes buy of nested scales and of textures without losses of coding.
 struct RivalPrices {
   double mesh = 1;              // times an estimate of Draco's meshes
@@ -53,6 +56,8 @@ class CompetingScales {
   /// What plans of a package with proxies pay for a scale that looks like those: besides mesh and textures
   /// they take tables and the coarsest scale's mesh, with which materials come.
   RivalPrices prices_in_plans() const;
+  /// Of scales, coded by Draco, about.
+  const std::vector<double>& bytes_of_meshes() const { return mesh_bytes_; }
 
  private:
   struct Competitor {

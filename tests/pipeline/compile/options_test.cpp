@@ -97,7 +97,8 @@ TEST(Options, NewChartsHaveDefaultsOfTheirOwn) {
   EXPECT_EQ(resolve_options(o).simplification.seam_weight, 1);
   EXPECT_EQ(resolve_options(o).proxies.mode, ProxyMode::kAuto);
   o.atlas.mode = AtlasMode::kAuto;
-  EXPECT_EQ(resolve_options(o).atlas.mode, AtlasMode::kKeep);
+  EXPECT_EQ(resolve_options(o).atlas.mode, AtlasMode::kAuto);
+  EXPECT_EQ(resolve_options(o).simplification.seam_weight, 1);
   o.atlas.mode = AtlasMode::kRebuild;
   EXPECT_EQ(resolve_options(o).simplification.seam_weight, 0.1);
   EXPECT_EQ(resolve_options(o).simplification.order, CollapseOrder::kTouching);

@@ -2,62 +2,18 @@
 
 #include <gtest/gtest.h>
 
-#include <map>
-
 #include "stages/base/run_context.h"
 #include "stages/charts/texture_frame.h"
 #include "stages/condition/condition.h"
 #include "stages/geometry/mesh_topology.h"
 #include "stages/image/decode_image.h"
-#include "stages/image/png_writer.h"
 #include "stages/simplification/simplification.h"
-#include "tests/support/hostile_meshes.h"
-#include "tests/support/meshes.h"
+#include "tests/stages/atlas/atlas_fixtures.h"
 
 namespace texmesh::atlas_test {
 
-using Pixel = std::array<std::uint8_t, 3>;
-
-Image image_of(std::uint32_t side_px, auto&& texel) {
-  Pixels pixels{side_px, side_px, 3, {}};
-  for (std::uint32_t y = 0; y < side_px; ++y)
-    for (std::uint32_t x = 0; x < side_px; ++x)
-      for (const std::uint8_t c : Pixel(texel(x, y))) pixels.data.push_back(c);
-  return {"a.png", ImageFormat::kPng, side_px, side_px, 3, 8, false, false, write_png(pixels)};
-}
-
-/// Red is u, green is v.
-Image places(std::uint32_t side_px) {
-  return image_of(side_px, [=](std::uint32_t x, std::uint32_t y) {
-    return Pixel{static_cast<std::uint8_t>((x + 0.5) * 255 / side_px),
-                 static_cast<std::uint8_t>((y + 0.5) * 255 / side_px), 0};
-  });
-}
-
-/// Every triangle in a cell of its own.
-Mesh scattered(const Mesh& from) {
-  Mesh out = from;
-  const auto columns = static_cast<std::uint32_t>(std::ceil(std::sqrt(double(from.triangles.size()))));
-  out.wedge_position.clear(), out.uv0.clear(), out.normals.clear();
-  for (std::uint32_t t = 0; t < from.triangles.size(); ++t)
-    for (std::uint32_t k = 0; k < 3; ++k) {
-      const std::uint32_t wedge = from.triangles[t][k];
-      const float x = k == 1 ? 0.8f : 0.2f, y = k == 2 ? 0.8f : 0.2f;
-      out.triangles[t][k] = static_cast<std::uint32_t>(out.wedge_position.size());
-      out.wedge_position.push_back(from.wedge_position[wedge]);
-      if (!from.normals.empty()) out.normals.push_back(from.normals[wedge]);
-      out.uv0.push_back(
-          {(float(t % columns) + x) / float(columns), (float(t / columns) + y) / float(columns)});
-    }
-  return out;
-}
-
-/// Numbers: no curve of sRGB between the texels and what is compared.
-Material data_material(std::int32_t image) {
-  Material out;
-  out.metallic_roughness_texture.image = image;
-  return out;
-}
+using testing::data_material, testing::image_of, testing::in_charts, testing::Pixel, testing::places,
+    testing::scattered;
 
 struct Charted {
   ConditionedMesh source;
@@ -173,28 +129,6 @@ TEST(Atlas, MaterialsThatDifferInImagesAloneBecomeOne) {
   EXPECT_EQ(plain.made.images.size(), 1u);
 }
 
-/// A sphere whose triangles lie in `charts` charts of one row of quads or part of it, each in a cell of its
-/// own.
-Mesh in_charts(const Mesh& from, std::uint32_t charts) {
-  Mesh out = from;
-  out.wedge_position.clear(), out.uv0.clear(), out.normals.clear();
-  std::map<std::array<std::uint32_t, 2>, std::uint32_t> ids;
-  const auto columns = static_cast<std::uint32_t>(std::ceil(std::sqrt(double(charts))));
-  for (std::uint32_t t = 0; t < from.triangles.size(); ++t) {
-    const auto chart = static_cast<std::uint32_t>(std::uint64_t{t} * charts / from.triangles.size());
-    for (std::uint32_t& w : out.triangles[t]) {
-      const auto [at, fresh] =
-          ids.try_emplace({w, chart}, static_cast<std::uint32_t>(out.wedge_position.size()));
-      const std::uint32_t old = std::exchange(w, at->second);
-      if (!fresh) continue;
-      out.wedge_position.push_back(from.wedge_position[old]);
-      const Vec2f cell{float(chart % columns), float(chart / columns)};
-      out.uv0.push_back((cell + from.uv0[old] * 0.9f) * (1 / float(columns)));
-    }
-  }
-  return out;
-}
-
 TEST(Atlas, TheCoarsestScaleIsSmallForAnyNumberOfCharts) {
   for (const std::uint32_t charts : {20u, 1000u, 5000u}) {
     const Charted c =
@@ -270,31 +204,7 @@ TEST(Atlas, AlphaStaysBesideMaterialsWithoutTextures) {
 }
 
 TEST(Atlas, StrangeModelsAreRebuiltOrKept) {
-  testing::Random random{1};
-  const auto with_uv = [](Mesh mesh, float scale) {
-    mesh.uv0.clear();
-    for (const std::uint32_t p : mesh.wedge_position) {
-      const Vec3f at = mesh.positions[p];
-      mesh.uv0.push_back({at.x * scale, at.y * scale});
-    }
-    return mesh;
-  };
-  Mesh far = testing::sheet(6);
-  for (Vec3f& p : far.positions) p = p + Vec3f{1e7f, 1e7f, -1e7f};
-  Mesh huge = testing::bumpy_sphere(6, 8);
-  for (Vec3f& p : huge.positions) p = p * 1e7f;
-  Mesh one = testing::sheet(1);
-  one.triangles.resize(1), one.triangle_material.resize(1), one.triangle_part.resize(1);
-  const std::vector<Mesh> meshes{with_uv(testing::cube(), 20),           // tiles
-                                 with_uv(testing::sphere(8, 12), 0.5f),  // two sides share texels
-                                 with_uv(testing::sheet(4), 0),          // no area in the texture
-                                 far,
-                                 huge,
-                                 one,
-                                 with_uv(testing::sliver_sheet(6), 1),
-                                 with_uv(testing::dust(60, 0.01f), 1),
-                                 with_uv(testing::dust(1500, 0.01f), 1),  // crumbs
-                                 with_uv(testing::random_soup(random, 30, 80), 1)};
+  const std::vector<Mesh> meshes = testing::strange_models();
   for (std::size_t i = 0; i < meshes.size(); ++i)
     for (const std::uint32_t side_px : {1u, 33u}) {
       SCOPED_TRACE(i);

@@ -66,7 +66,8 @@ void advise_on_charts(const AtlasDiagnosis& d, AdviceList& out) {
            kilobytes(d.floor_bytes())),
        "Make a new atlas with fewer and larger charts: remove loose specks, close holes and smooth noise "
        "first, because unwrappers cut at creases; then unwrap the finished mesh and bake the texture onto "
-       "it. Or try compile --atlas rebuild: close views then touch about half the texels."});
+       "it. Or try compile --atlas auto: it makes larger charts where lit pictures then look better for the same "
+       "bytes. With --atlas rebuild close views touch about half the texels."});
 }
 
 void advise_on_packing(const NamedAtlas& a, AdviceList& out) {
