@@ -2,8 +2,8 @@
 # neighbours include, too. A change of a source then compiles its neighbours again, so this is for builds that are made once.
 # No name of a source clashes with a neighbour's: tests/house/check_unity.
 option(TEXMESH_UNITY "Compile several sources of a room as one: a faster build, a slower change" OFF)
-set(texmesh_unity_most 8)  # sources of a unit
-set(texmesh_unity_bytes 80000)  # of a unit's sources, about: 6 CPU seconds
+set(texmesh_unity_most 14)  # sources of a unit
+set(texmesh_unity_bytes 140000)  # of a unit's sources, about: 12 CPU seconds; two of half the bytes take 2 or 3 more
 
 # Shares the sources of a room evenly among units, by their bytes. Units are named after the room. CMake leaves sources with
 # options of their own out of units; so the units get these options (texmesh_optimise_little).
