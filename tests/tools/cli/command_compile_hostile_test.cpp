@@ -246,6 +246,8 @@ TEST_F(Hostile, UrisThatLeaveTheFolder) {
   write_text(in("m.obj"), "mtllib m.mtl\nusemtl a\n" + kObj);
   expect_warned("m.obj", "missing-texture");
   write_text(in("m.obj"), "mtllib ../../etc/hostname\n" + kObj);
+  expect_warned("m.obj", "renamed-mtl");
+  fs::remove(in("m.mtl"));
   expect_warned("m.obj", "missing-mtl");
 }
 TEST_F(Hostile, SymbolicLinksAndPipesAsTextures) {
