@@ -1,4 +1,6 @@
 #pragma once
+#include <map>
+
 // How a model looks beside S_0, and how nested scales with whole textures look for a number of bytes.
 #include "stages/data/nested_scales.h"
 #include "stages/render/shade.h"
