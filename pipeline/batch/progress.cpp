@@ -7,6 +7,7 @@
 #include <ostream>
 
 #include "pipeline/batch/fleet/run_summary.h"
+#include "pipeline/compile/options.h"
 #include "pipeline/import/import.h"
 #include "pipeline/io/table.h"
 
@@ -199,7 +200,8 @@ void Progress::show(std::size_t, const CacheTold& e) {
 
 void Progress::show(std::size_t, const NoteTold& e) {
   const bool warns = e.note.severity == Severity::kWarning;
-  const bool tells = is_told_always(e.note) || e.note.code == kTurnedNote;
+  constexpr std::array<std::string_view, 3> kToldOnce{kTurnedNote, kChosenAtlasNote, kRebuiltAtlasNote};
+  const bool tells = is_told_always(e.note) || std::ranges::count(kToldOnce, e.note.code) > 0;
   if (warns || verbose_ || (tells && mode_ != OutputMode::kQuiet))
     line(fmt::format("{}: {}: {}", e.model, warns ? "warning" : "note", note_sentence(e.note)));
 }

@@ -9,6 +9,7 @@
 #include "format/container/layout.h"
 #include "pipeline/about/source_annotations.h"
 #include "pipeline/compile/stage_table.h"
+#include "pipeline/graph/memory_store.h"
 #include "pipeline/import/archive/archive_about.h"
 #include "pipeline/io/atomic_file.h"
 #include "pipeline/io/file_resolver.h"
@@ -312,47 +313,89 @@ CompileOptions options_with_atlas(CompileOptions options, AtlasMode mode) {
   return resolve_options(std::move(options));
 }
 
-/// How the source's charts look, or new ones.
-AtlasSample sample_with(AtlasMode mode, const CompileOptions& resolved, ModelSource& source, Store& store,
-                        const RunContext& context, const StageObserver& observer) {
-  const CompileOptions options = options_with_atlas(resolved, mode);
-  ModelGraph graph(source, graph_towards(atlas_choice_stage(options), options), options, store, context,
-                   observer);
-  return *graph->run(kAtlasSample);
-}
+/// Options with keep or rebuild where `resolved` has auto. The package is the one of that mode.
+class AtlasChooser {
+ public:
+  AtlasChooser(const CompileOptions& resolved, ModelSource& source, Store& store, const RunContext& context)
+      : resolved_(resolved),
+        source_(source),
+        store_(is_open() && !store.keeps_results() ? memory_ : store),
+        context_(context) {}
 
-/// Options with keep or rebuild where they have auto. The package is the one of that mode. What was found
-/// stands in the store, and so do the results that the package is made from.
-CompileOptions with_chosen_atlas(CompileOptions options, ModelSource& source, Store& store,
-                                 const RunContext& context, const StageObserver& observer, Notes& notes) {
-  if (options.atlas.mode != AtlasMode::kAuto) return options;
-  const auto sample = [&](AtlasMode mode) {
-    return sample_with(mode, options, source, store, context, observer);
-  };
-  const AtlasSample kept = sample(AtlasMode::kKeep);
-  const AtlasChoice choice = choose_atlas(kept, kept.good.empty() ? sample(AtlasMode::kRebuild) : kept);
-  add_info(notes, "atlas-chosen", "", choice.why);
-  return options_with_atlas(std::move(options), choice.rebuild ? AtlasMode::kRebuild : AtlasMode::kKeep);
-}
+  bool is_open() const { return resolved_.atlas.mode == AtlasMode::kAuto && !resolved_.ladder.keep_source; }
+  /// Has what was looked at, so that the package's graph does not make it again.
+  Store& store() { return store_; }
+  StageKeys keys;  // of the stages that looked
+
+  /// Tells each stage that runs, and those that do not once.
+  StageExplainer explain_once(StageExplainer explainer) {
+    if (!explainer) return {};
+    return [this, explainer = std::move(explainer)](const Stage& stage, const StageExplanation& e) {
+      if (told_.insert(stage.name).second || e.verdict != StageVerdict::kHit) explainer(stage, e);
+    };
+  }
+
+  CompileOptions choose(const StageKeys& earlier, const StageExplainer& explainer,
+                        const StageObserver& observer, Notes& notes) {
+    if (resolved_.atlas.mode != AtlasMode::kAuto) return resolved_;
+    if (!is_open()) {
+      add_info(notes, kChosenAtlasNote, "",
+               "auto keeps the source's atlas: --keep-source asks for its files");
+      return options_with_atlas(resolved_, AtlasMode::kKeep);
+    }
+    const auto sample_of = [&](AtlasMode mode) { return sample(mode, earlier, explainer, observer); };
+    const AtlasSample kept = sample_of(AtlasMode::kKeep);
+    const AtlasChoice choice = choose_atlas(kept, kept.good.empty() ? sample_of(AtlasMode::kRebuild) : kept);
+    memory_.close();
+    const std::string lost = choice.rebuild ? std::string(". ") + kLostByRebuilding : "";
+    add_info(notes, kChosenAtlasNote, "", choice.why + lost);
+    return options_with_atlas(resolved_, choice.rebuild ? AtlasMode::kRebuild : AtlasMode::kKeep);
+  }
+
+  /// How the source's charts look, or new ones.
+  AtlasSample sample(AtlasMode mode, const StageKeys& earlier, const StageExplainer& explainer,
+                     const StageObserver& observer) {
+    const CompileOptions options = options_with_atlas(resolved_, mode);
+    const Stage last = atlas_choice_stage(options);
+    ModelGraph graph(source_, graph_towards(last, options), options, store_, context_, observer);
+    graph->explain(earlier, explainer);
+    AtlasSample found = *graph->run(kAtlasSample);
+    keys[last.name] = graph->keys().at(last.name);
+    return found;
+  }
+
+ private:
+  const CompileOptions& resolved_;
+  ModelSource& source_;
+  MemoryStore memory_;
+  Store& store_;
+  const RunContext& context_;
+  std::set<std::string> told_;
+};
 
 CompileOutcome compile_source(const CompileRequest& request, const CompileOptions& resolved,
                               ModelSource& source, Store& store, const RunContext& context,
                               const StageObserver& observer) {
   source.open(store, context, true);
   Notes notes;
-  const CompileOptions options = with_archived_notes(
-      with_chosen_atlas(resolved, source, store, context, observer, notes), source, notes);
-  ModelGraph graph(source, stage_table(options), options, store, context, observer);
-  graph->explain(request.earlier_keys, request.explainer);
+  AtlasChooser chooser(resolved, source, store, context);
+  const StageExplainer explainer = chooser.explain_once(request.explainer);
+  const CompileOptions options =
+      with_archived_notes(chooser.choose(request.earlier_keys, explainer, observer, notes), source, notes);
+  ModelGraph graph(source, stage_table(options), options, chooser.store(), context, observer);
+  graph->explain(request.earlier_keys, explainer);
   const std::shared_ptr<const Bytes> package = graph->run(kPackage);
 
   CompileOutcome outcome;
   outcome.package_bytes = package->size();
   outcome.package_digest = sha256(*package);
   outcome.notes = graph->notes();
+  if (chooser.is_open())
+    std::erase_if(outcome.notes, [](const Note& n) { return n.code == kRebuiltAtlasNote; });
   outcome.notes.insert(outcome.notes.end(), notes.begin(), notes.end());
   outcome.files = source.files();
   outcome.keys = graph->keys();
+  outcome.keys.merge(chooser.keys);
   if (request.strict) refuse_warnings(outcome.notes, request.input);
   if (request.output.empty()) return outcome;
   outcome.unchanged = file_holds(request.output, *package);
@@ -386,40 +429,41 @@ void run_towards(const CompileRequest& request, Stage last, Store& store, const 
   ModelSource source(request);
   source.open(store, context, true);
   Notes unused;
-  const CompileOptions options =
-      with_chosen_atlas(resolve_options(request.options), source, store, context, observer, unused);
-  ModelGraph graph(source, graph_towards(std::move(last), options), options, store, context, observer);
+  const CompileOptions resolved = resolve_options(request.options);
+  AtlasChooser chooser(resolved, source, store, context);
+  const CompileOptions options = chooser.choose({}, {}, observer, unused);
+  ModelGraph graph(source, graph_towards(std::move(last), options), options, chooser.store(), context,
+                   observer);
   use(*graph);
 }
 
 std::vector<StageForecast> forecast_model(const CompileRequest& request, Store& store,
                                           const RunContext& context) {
-  CompileOptions options = resolve_options(request.options);
+  const CompileOptions resolved = resolve_options(request.options);
   ModelSource source(request);
   source.open(store, context, false);
-  const auto forecasts_of = [&](ModelGraph& graph) {
+  const auto forecasts_of = [&](std::vector<Stage> stages, const CompileOptions& options) {
+    ModelGraph graph(source, std::move(stages), options, store, context, {});
     graph->explain(request.earlier_keys, {});
     std::vector<StageForecast> forecasts;
     for (auto& [stage, explanation] : graph->forecast())
       forecasts.push_back({stage->name, std::move(explanation)});
     return forecasts;
   };
+  AtlasChooser chooser(resolved, source, store, context);
   // Before auto's choice is in the store nobody knows what follows.
   for (const AtlasMode mode : {AtlasMode::kKeep, AtlasMode::kRebuild}) {
-    if (options.atlas.mode != AtlasMode::kAuto) break;
-    const CompileOptions looked_at = options_with_atlas(options, mode);
-    ModelGraph graph(source, graph_towards(atlas_choice_stage(looked_at), looked_at), looked_at, store,
-                     context, {});
-    std::vector<StageForecast> forecasts = forecasts_of(graph);
+    if (!chooser.is_open()) break;
+    const CompileOptions looked_at = options_with_atlas(resolved, mode);
+    std::vector<StageForecast> forecasts =
+        forecasts_of(graph_towards(atlas_choice_stage(looked_at), looked_at), looked_at);
     for (const StageForecast& f : forecasts)
       if (f.explanation.verdict != StageVerdict::kHit) return forecasts;
-    if (!sample_with(mode, options, source, store, context, {}).good.empty()) break;
+    if (!chooser.sample(mode, {}, {}, {}).good.empty()) break;
   }
   Notes unused;
-  options = with_archived_notes(with_chosen_atlas(std::move(options), source, store, context, {}, unused),
-                                source, unused);
-  ModelGraph graph(source, stage_table(options), options, store, context, {});
-  return forecasts_of(graph);
+  const CompileOptions options = with_archived_notes(chooser.choose({}, {}, {}, unused), source, unused);
+  return forecasts_of(stage_table(options), options);
 }
 
 }  // namespace texmesh

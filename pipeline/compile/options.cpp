@@ -188,6 +188,12 @@ void check_options(const CompileOptions& o, const std::string& source) {
   check_rising(o.ladder.normal_rungs, 16, source, "ladder.normal_rungs", "qualities");
   check_rising(o.ladder.data_rungs, 16, source, "ladder.data_rungs", "qualities");
   check_rising(o.ladder.alpha_rungs, 16, source, "ladder.alpha_rungs", "qualities");
+  if (o.ladder.keep_source && o.atlas.mode == AtlasMode::kRebuild)
+    throw InputError(
+        source, "atlas.mode",
+        "keep or auto with ladder.keep_source, since a package has no place for files of textures "
+        "that it does not show",
+        "rebuild");
   if (o.lut.quality_min > o.lut.quality_max)
     throw InputError(source, "lut.quality_min", "<= lut.quality_max (" + option_text(o.lut.quality_max) + ")",
                      option_text(o.lut.quality_min));

@@ -238,9 +238,10 @@ std::vector<Stage> stage_table(const CompileOptions& o) {
 }
 
 Stage atlas_choice_stage(const CompileOptions& o) {
-  const StageTitle title{"atlas_choice", kAtlasChoiceVersion,
+  const bool keeps = o.atlas.mode == AtlasMode::kKeep;
+  const StageTitle title{keeps ? "atlas_choice" : "atlas_choice_rebuilt", kAtlasChoiceVersion,
                          "source, nested scales -> lit pictures for the bytes of loads", .05};
-  if (o.atlas.mode == AtlasMode::kKeep)
+  if (keeps)
     return stage(title, inputs(kConditionedMesh, kMaterials, kImages, kNestedScales, kProxies),
                  outputs(kAtlasSample), Options<>{}, kImageLibraries, sample_source);
   return stage(

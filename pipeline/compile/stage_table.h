@@ -57,8 +57,9 @@ inline constexpr Artefact<Bytes> kPackage{"package"};
 /// keep there is no stage of that name, and the later ones read what import and condition made.
 std::vector<Stage> stage_table(const CompileOptions& options);
 
-/// Looks at what is shown with the charts of these options beside the source. It stands in no graph of a
-/// package: whoever asks for atlas.mode auto compares what it finds with keep and with rebuild.
+/// Looks at what is shown with the charts of these options, keep or rebuild, beside the source: each has a
+/// name of its own. It stands in no graph of a package: whoever asks for atlas.mode auto compares what it
+/// finds with keep and with rebuild.
 Stage atlas_choice_stage(const CompileOptions& options);
 
 /// The graph with default options: for those who ask for names, versions and inputs.

@@ -136,11 +136,9 @@ ChartedModel chart_model(const ConditionedMesh& mesh, const std::vector<Material
   ChartedModel out;
   out.mesh = mesh_on_pages(mesh, *pages);
   add_pages(mesh, materials, images, classes, *pages, out, context);
-  add_info(
-      out.notes, "atlas-rebuilt", "",
-      "a new atlas has " + std::to_string(pages->chart_count) + " charts for " + std::to_string(charts) +
-          "; coarse scales and coordinates take fewer bytes. The source's own files of its textures are not "
-          "in the package, and new texels differ a little from them");
+  add_info(out.notes, kRebuiltAtlasNote, "",
+           "a new atlas has " + std::to_string(pages->chart_count) + " charts for " + std::to_string(charts) +
+               "; coarse scales and coordinates take fewer bytes. " + kLostByRebuilding);
   return out;
 }
 

@@ -13,6 +13,11 @@ struct EnumNames<AtlasMode> {
   static constexpr std::array<std::string_view, 3> names{"keep", "rebuild", "auto"};
 };
 
+/// The note of a new atlas, and what its files are not.
+inline constexpr const char* kRebuiltAtlasNote = "atlas-rebuilt";
+inline constexpr const char* kLostByRebuilding =
+    "The source's own files of its textures are not in the package, and new texels differ a little from them";
+
 struct AtlasOptions {
   AtlasMode mode = AtlasMode::kKeep;
   double density = 1;

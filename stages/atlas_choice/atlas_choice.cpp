@@ -10,9 +10,6 @@
 namespace texmesh {
 namespace {
 
-// Scans of fewer gain nothing that pays for the source's coefficients.
-constexpr std::size_t kFewCharts = 500;
-
 /// What bytes buy: rising bytes, FLIP of each.
 using Curve = std::vector<std::pair<double, double>>;
 
@@ -172,6 +169,9 @@ AtlasChoice choose_atlas(const AtlasSample& kept, const AtlasSample& rebuilt) {
   // What costs the source's coefficients must be more than noise.
   constexpr double kWorth = 0.97, kLeastFlip = 1e-3;
   if (!kept.good.empty()) return {false, "auto keeps the source's atlas: " + kept.good};
+  if (rebuilt.charts >= kept.charts)
+    return {false, "auto keeps the source's atlas of " + std::to_string(kept.charts) +
+                       " charts: a new one has no fewer"};
   double sum = 0;
   for (std::size_t i = 0; i < kSampledBytes.size(); ++i) {
     // Both have proxies, which look alike.

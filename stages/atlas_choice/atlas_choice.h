@@ -9,6 +9,10 @@
 namespace texmesh {
 
 inline constexpr int kAtlasChoiceVersion = 1;
+inline constexpr const char* kChosenAtlasNote = "atlas-chosen";
+
+/// Scans of fewer charts gain nothing that pays for the source's coefficients: they keep theirs unseen.
+inline constexpr std::size_t kFewCharts = 500;
 
 /// Bytes of ordinary loads.
 inline constexpr std::array<std::uint64_t, 4> kSampledBytes{200'000, 300'000, 500'000, 1'000'000};
@@ -35,7 +39,7 @@ AtlasSample sample_atlas(const ConditionedMesh& source, const std::vector<Materi
 /// The same with proxies, which plans show where they look better.
 AtlasSample with_proxies(AtlasSample sample, const Proxies& proxies);
 
-/// Whether new charts are worth the source's coefficients that they cost, and why.
+/// Whether new charts are worth the source's coefficients that they cost, and why: for a note.
 struct AtlasChoice {
   bool rebuild = false;
   std::string why;

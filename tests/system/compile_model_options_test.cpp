@@ -5,9 +5,9 @@
 
 #include "delivery/cpp/package/package_reader.h"
 #include "pipeline/compile/compile_model.h"
+#include "pipeline/graph/memory_store.h"
 #include "pipeline/graph/store.h"
 #include "tests/support/command.h"
-#include "tests/support/memory_store.h"
 #include "tools/inspect/provenance.h"
 
 namespace texmesh::compile_model_options_test {

@@ -3,10 +3,10 @@
 
 #include "delivery/cpp/client/delivery_plan.h"
 #include "pipeline/compile/compile_model.h"
+#include "pipeline/graph/memory_store.h"
 #include "pipeline/graph/store.h"
 #include "tests/support/command.h"
 #include "tests/support/images.h"
-#include "tests/support/memory_store.h"
 #include "tests/support/meshes.h"
 #include "tests/support/packages.h"
 

@@ -160,10 +160,14 @@ int run_doctor(const DoctorArguments& args) {
   write_gate_junit(args.junit, "texmesh doctor", args.input, results);
   const std::vector<std::string> reasons = gate_failures(results);
   const std::string name = std::filesystem::path(args.input).filename().string();
+  std::optional<std::string> auto_atlas;
+  if (!is_package(args.input)) auto_atlas = auto_atlas_text(diagnosis);
   if (args.json) {
-    std::cout << to_json_line(DoctorReport{name, diagnosis, reasons, notes}) << '\n';
+    std::cout << to_json_line(DoctorReport{name, diagnosis, reasons, notes, auto_atlas}) << '\n';
   } else {
-    std::cout << printable(name) << "\n" << atlas_text(diagnosis) << gate_text(results);
+    std::cout << printable(name) << "\n" << atlas_text(diagnosis);
+    if (auto_atlas) std::cout << *auto_atlas << "\n";
+    std::cout << gate_text(results);
     if (notes) std::cout << "notes: " << notes_words(*notes) << "\n";
   }
   return reasons.empty() ? kExitOk : kExitDifferent;

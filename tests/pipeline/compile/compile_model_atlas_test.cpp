@@ -4,48 +4,46 @@
 #include <map>
 
 #include "pipeline/compile/compile_model.h"
+#include "pipeline/graph/memory_store.h"
+#include "stages/atlas/atlas.h"
 #include "stages/image/png_writer.h"
+#include "tests/stages/atlas/atlas_fixtures.h"
 #include "tests/support/command.h"
-#include "tests/support/memory_store.h"
 #include "tests/support/meshes.h"
 
 namespace texmesh::compile_model_atlas_test {
 
-/// A bumpy sphere, textured by its longitude, cut into so many charts, row by row.
-std::string sphere_obj(int rows, int columns, int pieces) {
-  const Mesh mesh = testing::bumpy_sphere(rows, columns);
-  std::string out = "mtllib a.mtl\nusemtl a\n";
+/// A textured model, whose corners without texture coordinates are those of a second material.
+std::string obj_of(const Mesh& mesh) {
+  std::string out = "mtllib a.mtl\n";
   const auto line = [&out](const char* what, auto... numbers) {
     out += what;
     ((out += " " + std::to_string(numbers)), ...);
     out += "\n";
   };
   for (const Vec3f& p : mesh.positions) line("v", p.x, p.y, p.z);
-  int last = 0;
-  std::map<std::pair<std::uint32_t, std::size_t>, int> known;
+  for (const Vec2f& uv : mesh.uv0) line("vt", uv.x, uv.y);
   for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
-    const std::size_t piece = t * static_cast<std::size_t>(pieces) / mesh.triangles.size();
-    std::string face = "f";
-    for (const std::uint32_t w : mesh.triangles[t]) {
-      const auto [at, fresh] = known.try_emplace({w, piece}, last + 1);
-      if (fresh) line("vt", mesh.uv0[w].x, mesh.uv0[w].y + 1e-5f * static_cast<float>(piece)), ++last;
-      face += " " + std::to_string(mesh.wedge_position[w] + 1) + "/" + std::to_string(at->second);
-    }
+    const bool bare = mesh.triangle_material[t] == 1;
+    std::string face = bare ? "usemtl b\nf" : "usemtl a\nf";
+    for (const std::uint32_t w : mesh.triangles[t])
+      face += " " + std::to_string(mesh.wedge_position[w] + 1) + (bare ? "" : "/" + std::to_string(w + 1));
     out += face + "\n";
   }
   return out;
 }
 
+/// Its charts lie in a corner of the texture.
+Mesh in_corner(Mesh mesh) {
+  for (Vec2f& uv : mesh.uv0) uv = uv * 0.3f;
+  return mesh;
+}
+
 class AutoAtlas : public ::testing::Test {
  protected:
   AutoAtlas() {
-    Pixels picture{256, 256, 3, {}};
-    for (std::uint32_t i = 0; i < 256 * 256; ++i)
-      for (const std::uint32_t c : {i % 256, i / 256, (i % 256) * (i / 256) / 300})
-        picture.data.push_back(static_cast<std::uint8_t>(c));
-    const Bytes png = write_png(picture);
-    testing::write_text(folder_ / "a.png", {png.begin(), png.end()});
-    testing::write_text(folder_ / "a.mtl", "newmtl a\nmap_Kd a.png\n");
+    write_noise(64);
+    testing::write_text(folder_ / "a.mtl", "newmtl a\nmap_Kd a.png\nnewmtl b\nKd 1 0 0\n");
     options_.ssf.scales = 8;
     options_.skeletonization.alpha_divisor = 5;
     options_.skeletonization.offset_divisor = 50;
@@ -55,6 +53,14 @@ class AutoAtlas : public ::testing::Test {
     options_.proxies.mode = ProxyMode::kNone;
     options_.set_by_user = {"proxies.mode"};
   }
+  void write_noise(std::uint32_t side_px) {
+    Pixels picture{side_px, side_px, 3, {}};
+    testing::Random random{1};
+    for (std::uint32_t i = 0; i < 3 * side_px * side_px; ++i)
+      picture.data.push_back(static_cast<std::uint8_t>(random.next() % 256));
+    const Bytes png = write_png(picture);
+    testing::write_text(folder_ / "a.png", {png.begin(), png.end()});
+  }
   CompileRequest request(AtlasMode mode) {
     CompileRequest out;
     out.input = folder_ / "a.obj";
@@ -63,12 +69,14 @@ class AutoAtlas : public ::testing::Test {
     out.options.atlas.mode = mode;
     return out;
   }
-  CompileOutcome compile(AtlasMode mode) {
-    ran_.clear();
-    return compile_model(request(mode), store_, {},
-                         [&](const Stage& stage, StageEvent event, double, double) {
-                           if (event == StageEvent::kRan) ++ran_[stage.name];
-                         });
+  CompileOutcome compile(AtlasMode mode) { return compile(mode, store_); }
+  CompileOutcome compile(AtlasMode mode, Store& store) {
+    ran_.clear(), explained_.clear();
+    CompileRequest wanted = request(mode);
+    wanted.explainer = [&](const Stage& stage, const StageExplanation&) { ++explained_[stage.name]; };
+    return compile_model(wanted, store, {}, [&](const Stage& stage, StageEvent event, double, double) {
+      if (event == StageEvent::kRan) ++ran_[stage.name];
+    });
   }
   static std::string told(const CompileOutcome& outcome) {
     for (const Note& n : outcome.notes)
@@ -78,11 +86,11 @@ class AutoAtlas : public ::testing::Test {
   testing::TemporaryFolder folder_;
   MemoryStore store_;
   CompileOptions options_;
-  std::map<std::string, int> ran_;
+  std::map<std::string, int> ran_, explained_;
 };
 
 TEST_F(AutoAtlas, KeepsAGoodAtlasByteForByte) {
-  testing::write_text(folder_ / "a.obj", sphere_obj(12, 16, 1));
+  testing::write_text(folder_ / "a.obj", obj_of(testing::bumpy_sphere(12, 16)));
   const CompileOutcome chosen = compile(AtlasMode::kAuto);
   EXPECT_NE(told(chosen).find("keeps"), std::string::npos) << told(chosen);
   EXPECT_FALSE(ran_.contains("atlas"));
@@ -91,21 +99,57 @@ TEST_F(AutoAtlas, KeepsAGoodAtlasByteForByte) {
   EXPECT_EQ(told(kept), "");
   EXPECT_EQ(kept.package_digest, chosen.package_digest);
   EXPECT_TRUE(ran_.empty());
+  NullStore nothing;
+  EXPECT_EQ(compile(AtlasMode::kAuto, nothing).package_digest, chosen.package_digest);
+  for (const auto& [stage, times] : ran_)
+    if (stage != "fill") EXPECT_EQ(times, 1) << stage << " without a cache";  // fill is never kept
 }
 
-TEST_F(AutoAtlas, OfManyChartsItIsThePackageOfWhatItSays) {
-  testing::write_text(folder_ / "a.obj", sphere_obj(24, 36, 600));
+/// Noise that no chart shows, in a texture of thousands of borders, costs more than its texels are worth.
+TEST_F(AutoAtlas, RebuildsAFragmentedAtlasByteForByte) {
+  write_noise(1024);
+  testing::write_text(folder_ / "a.obj", obj_of(in_corner(testing::in_charts(testing::pole(), 600))));
   const CompileOutcome chosen = compile(AtlasMode::kAuto);
-  EXPECT_NE(told(chosen).find("times as far"), std::string::npos) << told(chosen);
-  EXPECT_EQ(ran_["atlas"], 1);
+  EXPECT_NE(told(chosen).find("takes"), std::string::npos) << told(chosen);
+  EXPECT_NE(told(chosen).find(kLostByRebuilding), std::string::npos) << told(chosen);
+  EXPECT_EQ(std::ranges::count(chosen.notes, kRebuiltAtlasNote, &Note::code), 0) << "one line";
+  EXPECT_EQ(ran_["import"], 1);
   EXPECT_EQ(ran_["simplification"], 2) << "of both atlases, and not again";
-  const bool rebuilt = told(chosen).find("takes") != std::string::npos;
-  EXPECT_EQ(compile(rebuilt ? AtlasMode::kRebuild : AtlasMode::kKeep).package_digest, chosen.package_digest);
+  for (const char* stage : {"import", "atlas_choice", "atlas_choice_rebuilt", "package"})
+    EXPECT_EQ(explained_[stage], 1) << stage;
+  const CompileOutcome rebuilt = compile(AtlasMode::kRebuild);
+  EXPECT_EQ(rebuilt.package_digest, chosen.package_digest);
+  EXPECT_EQ(std::ranges::count(rebuilt.notes, kRebuiltAtlasNote, &Note::code), 1);
   EXPECT_TRUE(ran_.empty());
 }
 
+TEST_F(AutoAtlas, StrangeModelsAreRebuiltOrKept) {
+  std::vector<Mesh> models = testing::strange_models();
+  Mesh partly = testing::bumpy_sphere(6, 8);
+  for (std::size_t t = 0; t < partly.triangles.size(); ++t) partly.triangle_material[t] = t % 3 == 0;
+  models.push_back(std::move(partly));
+  for (std::size_t i = 0; i < models.size(); ++i) {
+    SCOPED_TRACE(i);
+    write_noise(i % 2 == 0 ? 1 : 33);
+    testing::write_text(folder_ / "a.obj", obj_of(models[i]));
+    for (const AtlasMode mode : {AtlasMode::kAuto, AtlasMode::kKeep, AtlasMode::kRebuild})
+      EXPECT_GT(compile(mode).package_bytes, 0u);
+  }
+}
+
+/// The format has a place for the file of a plane alone: those of the source have none behind other planes.
+TEST_F(AutoAtlas, KeepsWhatTheSourcesFilesAreAskedOf) {
+  testing::write_text(folder_ / "a.obj", obj_of(testing::in_charts(testing::bumpy_sphere(20, 30), 600)));
+  options_.ladder.keep_source = true;
+  const CompileOutcome chosen = compile(AtlasMode::kAuto);
+  EXPECT_NE(told(chosen).find("keep-source"), std::string::npos) << told(chosen);
+  EXPECT_FALSE(ran_.contains("atlas"));
+  options_.atlas.mode = AtlasMode::kRebuild;
+  EXPECT_THROW(check_options(options_, "options"), InputError);
+}
+
 TEST_F(AutoAtlas, ForecastsEndWhereTheChoiceIsNotKnown) {
-  testing::write_text(folder_ / "a.obj", sphere_obj(12, 16, 1));
+  testing::write_text(folder_ / "a.obj", obj_of(testing::bumpy_sphere(12, 16)));
   const auto last = [&] { return forecast_model(request(AtlasMode::kAuto), store_, {}).back(); };
   EXPECT_EQ(last().stage, "atlas_choice");
   compile(AtlasMode::kAuto);

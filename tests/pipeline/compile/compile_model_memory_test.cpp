@@ -2,10 +2,10 @@
 #include <gtest/gtest.h>
 
 #include "pipeline/compile/compile_model.h"
+#include "pipeline/graph/memory_store.h"
 #include "pipeline/graph/store.h"
 #include "pipeline/io/resolver.h"
 #include "tests/support/command.h"
-#include "tests/support/memory_store.h"
 
 namespace texmesh::compile_model_memory_test {
 

@@ -5,10 +5,10 @@
 #include <set>
 
 #include "pipeline/compile/compile_model.h"
+#include "pipeline/graph/memory_store.h"
 #include "pipeline/graph/store.h"
 #include "tests/support/command.h"
 #include "tests/support/images.h"
-#include "tests/support/memory_store.h"
 
 namespace texmesh::compile_model_reruns_test {
 

@@ -4,8 +4,8 @@
 
 #include <map>
 
+#include "pipeline/graph/memory_store.h"
 #include "tests/pipeline/graph/fake_graph.h"
-#include "tests/support/memory_store.h"
 
 namespace texmesh::explanation_test {
 

@@ -10,9 +10,9 @@
 #include <stdexcept>
 #include <utility>
 
+#include "pipeline/graph/memory_store.h"
 #include "pipeline/graph/stage.h"
 #include "tests/pipeline/graph/fake_graph.h"
-#include "tests/support/memory_store.h"
 
 namespace texmesh::graph_run_test {
 

@@ -51,6 +51,13 @@ inline Material data_material(std::int32_t image) {
   return out;
 }
 
+/// A thin one: pictures of it have few pixels, and are made soon.
+inline Mesh pole() {
+  Mesh out = bumpy_sphere(20, 30);
+  for (Vec3f& p : out.positions) p = {p.x * 0.12f, p.y, p.z * 0.12f};
+  return out;
+}
+
 /// A sphere whose triangles lie in `charts` charts of one row of quads or part of it, each in a cell of its
 /// own.
 inline Mesh in_charts(const Mesh& from, std::uint32_t charts) {

@@ -36,6 +36,9 @@ TEST_F(DoctorCommand, AModelAsTextAndAsJson) {
   EXPECT_EQ(json["input"], "scan.glb");
   EXPECT_EQ(json["good"], true);
   EXPECT_GT(json["charts"], 0);
+  EXPECT_EQ(json["auto_atlas"], "compile --atlas auto keeps the source's atlas: " +
+                                    std::to_string(json["charts"].get<int>()) + " charts are few");
+  EXPECT_NE(text.output.find(json["auto_atlas"].get<std::string>()), std::string::npos) << text.output;
   EXPECT_EQ(texmesh({"doctor", scan, "--json", "-j", "2"}).output, r.output);  // whatever the threads
 }
 
@@ -51,6 +54,7 @@ TEST_F(DoctorCommand, LimitsAreAGate) {
   EXPECT_TRUE(follows_schema(json, "doctor.v1"));
   EXPECT_EQ(json["good"], false);
   EXPECT_EQ(json["reasons"], Json({"charts: 6, expected at most 5"}));
+  EXPECT_FALSE(json.contains("auto_atlas")) << "of packages";
   EXPECT_NE(read_text(junit).find("<testsuite name=\"texmesh doctor\" tests=\"2\" failures=\"1\" "),
             std::string::npos);
   EXPECT_EQ(texmesh({"doctor", kPackage, "--max-charts", "5"}).exit_code, 4);

@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "pipeline/io/table.h"
+#include "stages/atlas_choice/atlas_choice.h"
 #include "stages/base/parallel.h"
 #include "stages/image/decode_image.h"
 #include "tools/inspect/package_mesh.h"
@@ -315,6 +316,16 @@ std::string atlas_text(const AtlasDiagnosis& d) {
   for (const AtlasAdvice& a : d.advice)
     out += "- " + (a.atlas.empty() ? "" : a.atlas + ": ") + a.found + "\n  " + a.remedy + "\n";
   return out;
+}
+
+std::string auto_atlas_text(const AtlasDiagnosis& d) {
+  const std::string keeps = "compile --atlas auto keeps the source's atlas: ";
+  if (!d.nothing.empty()) return keeps + "there is none to make anew";
+  if (d.charts() < kFewCharts) return keeps + fmt::format("{} charts are few", grouped(d.charts()));
+  return fmt::format(
+      "compile --atlas auto compares lit pictures of this atlas and of a new one, since {} charts are many; "
+      "compile says which it takes",
+      grouped(d.charts()));
 }
 
 DocumentSchema doctor_schema() {

@@ -137,18 +137,23 @@ AtlasDiagnosis diagnose_atlases(const AtlasSubject& subject, const RunContext& c
 /// For people: a block of lines for each texture, then what to do.
 std::string atlas_text(const AtlasDiagnosis& diagnosis);
 
+/// What compile --atlas auto does with such a model, and why; a sentence.
+std::string auto_atlas_text(const AtlasDiagnosis& diagnosis);
+
 /// What `doctor --json` prints.
 struct DoctorReport {
   std::string input;  // file name, no folder
   AtlasDiagnosis diagnosis;
   std::vector<std::string> reasons;  // the limits that are not kept
   std::optional<NotesCount> notes;
+  std::optional<std::string> auto_atlas;  // of a model
   static void fields(auto& s, auto&& v) {
     v("input", s.input, "file name, no folder");
     AtlasDiagnosis::fields(s.diagnosis, v);
     v("good", s.reasons.empty(), "every limit is kept");
     v("reasons", s.reasons, "the limits that are not");
     v("notes", s.notes, "where a package has notes at points");
+    v("auto_atlas", s.auto_atlas, "what compile --atlas auto does with a model, and why");
   }
 };
 DocumentSchema doctor_schema();

@@ -1,4 +1,5 @@
 #pragma once
+#include <atomic>
 #include <map>
 #include <mutex>
 
@@ -6,9 +7,12 @@
 
 namespace texmesh {
 
-/// In memory, for tests.
+/// Keeps results in memory, as long as it lives: of graphs that share stages where there is no cache.
 class MemoryStore : public Store {
  public:
+  /// What comes from now on is forgotten, what is there stays.
+  void close() { closed_ = true; }
+  bool keeps_results() const override { return !closed_; }
   std::optional<std::vector<StoredBlob>> find(const Sha256& key) override {
     const std::lock_guard lock(mutex_);
     const auto it = runs_.find(key);
@@ -21,6 +25,7 @@ class MemoryStore : public Store {
     return it == blobs_.end() ? nullptr : it->second;
   }
   bool put(const Key& key, const std::vector<std::pair<std::string, SharedBytes>>& outputs) override {
+    if (closed_) return true;
     std::vector<StoredBlob> run;
     for (const auto& [name, bytes] : outputs) run.push_back({name, sha256(*bytes), bytes->size()});
     const std::lock_guard lock(mutex_);
@@ -53,6 +58,7 @@ class MemoryStore : public Store {
 
  private:
   std::mutex mutex_;
+  std::atomic<bool> closed_ = false;
   std::map<Sha256, std::vector<StoredBlob>> runs_;
   std::map<Sha256, SharedBytes> blobs_;
   std::map<Sha256, std::string> notes_, preimages_;
