@@ -17,20 +17,6 @@ const ShownPlane& shown_plane(const ShownPackage& shown, std::uint32_t base) {
   return *found;
 }
 
-/// The source's textures in the order in which S_0's materials count them.
-std::vector<RenderTexture> source_textures(const std::string& source, const std::vector<TextureImage>& wanted,
-                                           const RunContext& context) {
-  RenderedModel model = load_rendered_model(source, {}, context);
-  std::vector<RenderTexture> out;
-  for (const TextureImage& image : wanted) {
-    const auto found = std::ranges::find(model.texture_images, image);
-    if (found == model.texture_images.end())
-      throw InputError(source, "", "an image for the package's " + image_name(image.image), "none");
-    out.push_back(model.textures[static_cast<std::size_t>(found - model.texture_images.begin())]);
-  }
-  return out;
-}
-
 }  // namespace
 
 Pixels read_shown_plane(PackageReader& package, std::uint32_t base, std::uint32_t plane,
@@ -74,9 +60,9 @@ PlanPictures::PlanPictures(PackageReader& package, const std::string& source, in
       views_(views),
       context_(context),
       environment_(environment_of(RenderLight::kStudio, context)),
-      finest_(bare_scale(package, 0, context)) {
-  source_ = source.empty() ? package_model(package, {0, PackageTextures::kRung, kBestRung}, context).textures
-                           : source_textures(source, finest_.texture_images, context);
+      finest_(bare_scale(package, 0, context)),
+      best_(package_model(package, {0, PackageTextures::kRung, kBestRung}, context).textures) {
+  if (!source.empty()) source_ = load_rendered_model(source, {}, context);
 }
 
 const RenderedModel& PlanPictures::scale(int scale) {
@@ -86,8 +72,7 @@ const RenderedModel& PlanPictures::scale(int scale) {
   return scales_.emplace(scale, package_scale(package_, scale, finest_, context_)).first->second;
 }
 
-PlanPictures::Place PlanPictures::place(int view, double displayed_px) const {
-  const BoundingSphere& sphere = finest_.bounds;
+PlanPictures::Place PlanPictures::place(const BoundingSphere& sphere, int view, double displayed_px) const {
   Place out{perspective_camera(camera_of(view, views_, sphere.centre, sphere.radius)), 0};
   const double distance = length(out.camera.eye - sphere.centre);
   const double side =
@@ -119,11 +104,16 @@ const std::vector<PlanPictures::Reference>& PlanPictures::references(double disp
   if (referenced_px_ == displayed_px) return references_;
   references_.clear();
   referenced_px_ = displayed_px;
-  const RenderScene scene = finest_.scene();
+  const RenderScene finest = finest_.scene();
+  const RenderedModel& model = source_ ? *source_ : finest_;
+  const RenderScene scene = model.scene();
   for (int v = 0; v < views_; ++v) {
-    Reference reference{place(v, displayed_px), {}, {}};
-    reference.seen = look(scene, reference.place.camera, reference.place.side_px, context_);
-    reference.flip = prepare_flip(shade(scene, reference.seen, source_, environment_, context_));
+    Reference reference{place(finest_.bounds, v, displayed_px), {}, {}};
+    reference.seen = look(finest, reference.place.camera, reference.place.side_px, context_);
+    const Visibility seen =
+        look(scene, place(model.bounds, v, displayed_px).camera, reference.place.side_px, context_);
+    reference.flip =
+        prepare_flip(shade(scene, seen, source_ ? source_->textures : best_, environment_, context_));
     references_.push_back(std::move(reference));
   }
   return references_;
@@ -155,7 +145,7 @@ RenderedFlip PlanPictures::measure(const ShownPackage& shown, double displayed_p
     if (shown.scale == 0) continue;
     const Visibility seen = look(coarse, reference.place.camera, reference.place.side_px, context_);
     add(coarse, seen, textures, whole);
-    add(coarse, seen, source_, geometry);
+    add(coarse, seen, best_, geometry);
   }
   if (shown.scale == 0) return {coded.mean(), 0, coded.mean()};
   return {whole.mean(), geometry.mean(), coded.mean()};
