@@ -1,6 +1,7 @@
 #pragma once
 #include <chrono>
 #include <iosfwd>
+#include <map>
 
 #include "pipeline/compile/workers/worker.h"
 

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <memory>
+
 #include "pipeline/compile/options.h"
 #include "pipeline/graph/graph_run.h"
 #include "pipeline/io/file_stamp.h"

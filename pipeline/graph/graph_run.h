@@ -1,5 +1,7 @@
 #pragma once
 
+#include <memory>
+
 #include "pipeline/graph/stage.h"
 #include "pipeline/graph/store.h"
 

@@ -1,4 +1,5 @@
 #pragma once
+#include <memory>
 #include <tuple>
 #include <typeindex>
 

@@ -1,4 +1,6 @@
 #pragma once
+#include <map>
+#include <memory>
 #include <nlohmann/json_fwd.hpp>
 #include <optional>
 

@@ -2,6 +2,8 @@
 #include <concepts>
 #include <functional>
 #include <limits>
+#include <map>
+#include <memory>
 #include <nlohmann/json_fwd.hpp>
 #include <optional>
 #include <type_traits>

@@ -1,4 +1,7 @@
 #pragma once
+#include <map>
+#include <memory>
+
 #include "pipeline/io/record.h"
 
 namespace texmesh {

@@ -81,9 +81,10 @@ export async function offerPackages(): Promise<boolean> {
   const items = list.filter((p) => typeof p.url === 'string').map((p) => {
     const name = p.name ?? readable(p.url).replace(/^packages\//, '').replace(/\.texmesh$/, '');
     const poster = typeof p.poster === 'string'
-      ? [make('img', { src: p.poster, alt: p.title ?? '', loading: 'lazy', width: '72', height: '72' })] : [];
+      ? [make('img', { src: p.poster, alt: '', loading: 'lazy', width: '72', height: '72' })] : [];
     return make('li', {},
-      make('a', { href: `?pkg=${encodeURIComponent(p.url)}` }, ...poster, make('span', {}, name)));
+      make('a', { href: `?pkg=${encodeURIComponent(p.url)}` }, ...poster,
+        make('span', {}, p.title || name)));
   });
   if (items.length) box().replaceChildren(make('h2', {}, 'Packages'), make('ul', {}, ...items));
   else {

@@ -2,6 +2,8 @@
 // What runs have found out about each package, and the files that hold it: blocks of memos, each file
 // appended by one process.
 
+#include <memory>
+
 #include "format/base/note.h"
 #include "pipeline/graph/store.h"
 #include "pipeline/io/file_stamp.h"

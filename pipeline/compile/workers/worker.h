@@ -1,4 +1,6 @@
 #pragma once
+#include <map>
+#include <memory>
 #include <variant>
 
 #include "pipeline/compile/workers/sandbox.h"

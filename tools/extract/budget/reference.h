@@ -1,5 +1,7 @@
 #pragma once
 
+#include <mutex>
+
 #include "format/base/vec.h"
 #include "format/rules/output_transform.h"
 #include "stages/geometry/scale_frames.h"

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <memory>
+
 #include "tools/publish/view/served_files.h"
 
 namespace texmesh {
