@@ -6,7 +6,6 @@
 
 #include <algorithm>
 
-#include "format/base/bytes.h"
 #include "format/base/descriptor.h"
 #include "format/container/layout.h"
 

@@ -1,7 +1,5 @@
 #include "format/documents/annotations.h"
 
-#include <cmath>
-
 #include "format/base/text_bytes.h"
 #include "format/container/layout.h"
 #include "format/documents/json_members.h"

@@ -1,6 +1,5 @@
 #include "format/rules/whole_textures.h"
 
-#include <algorithm>
 #include <map>
 #include <numeric>
 

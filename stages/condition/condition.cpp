@@ -1,7 +1,6 @@
 #include "stages/condition/condition.h"
 
 #include <cassert>
-#include <limits>
 #include <numeric>
 #include <tuple>
 

@@ -1,6 +1,5 @@
 #include "stages/package/package.h"
 
-#include <nlohmann/json.hpp>
 #include <set>
 
 #include "format/base/text_bytes.h"

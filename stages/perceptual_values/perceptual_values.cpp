@@ -1,7 +1,6 @@
 #include "stages/perceptual_values/perceptual_values.h"
 
 #include "format/base/portable_math.h"
-#include "format/rules/jnd_choice.h"
 #include "stages/base/parallel.h"
 #include "stages/geometry/distance.h"
 

@@ -1,7 +1,5 @@
 #include "stages/render/render_texture.h"
 
-#include <optional>
-
 #include "stages/base/parallel.h"
 #include "stages/image/decode_image.h"
 #include "stages/render/render_math.h"

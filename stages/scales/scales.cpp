@@ -1,4 +1,3 @@
-#include "format/container/layout.h"
 #include "format/rules/viewing.h"
 #include "format/rules/whole_textures.h"
 #include "stages/base/parallel.h"

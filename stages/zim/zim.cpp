@@ -5,7 +5,6 @@
 #include <cstdlib>
 #include <map>
 #include <sstream>
-#include <stdexcept>
 
 #include "stages/base/parallel.h"
 

@@ -1,7 +1,5 @@
 #include "delivery/cpp/client/delivery_plan.h"
 
-#include <algorithm>
-
 #include "format/rules/jnd_choice.h"
 
 namespace texmesh {

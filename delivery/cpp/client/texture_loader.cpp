@@ -1,7 +1,5 @@
 #include "delivery/cpp/client/texture_loader.h"
 
-#include <algorithm>
-
 namespace texmesh {
 namespace {
 

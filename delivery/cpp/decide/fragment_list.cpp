@@ -1,7 +1,5 @@
 #include "delivery/cpp/decide/fragment_list.h"
 
-#include <algorithm>
-
 #include "format/rules/allocation.h"
 #include "format/rules/size_curve.h"
 

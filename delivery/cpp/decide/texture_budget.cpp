@@ -1,7 +1,5 @@
 #include "delivery/cpp/decide/texture_budget.h"
 
-#include <algorithm>
-
 #include "format/base/portable_math.h"
 #include "format/rules/allocation.h"
 

@@ -1,5 +1,4 @@
 #pragma once
-#include <limits>
 
 #include "delivery/cpp/decide/fragment_list.h"
 

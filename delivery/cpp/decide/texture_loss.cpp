@@ -1,8 +1,5 @@
 #include "delivery/cpp/decide/texture_loss.h"
 
-#include <algorithm>
-
-#include "format/base/errors.h"
 #include "format/rules/allocation.h"
 #include "format/rules/viewing.h"
 

@@ -1,16 +1,7 @@
 #include "delivery/cpp/package/http_store.h"
 
-#include <algorithm>
 #include <chrono>
-#include <iterator>
 #include <thread>
-
-#include "format/base/bytes.h"
-#include "format/base/errors.h"
-#include "format/container/container.h"
-#include "format/container/layout.h"
-#include "format/documents/index.h"
-#include "format/documents/manifest.h"
 
 // How a package is read from web servers, from the bottom up. All readers of a package share the connections
 // of one HttpPool. HttpRetries counts the tries of a request. HttpSource reads ranges of a container,

@@ -1,12 +1,6 @@
 #include "delivery/cpp/package/package_reader.h"
 
-#include <algorithm>
 #include <numeric>
-
-#include "format/base/bytes.h"
-#include "format/base/errors.h"
-#include "format/container/layout.h"
-#include "format/documents/index.h"
 
 namespace texmesh {
 namespace {

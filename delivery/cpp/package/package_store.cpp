@@ -1,15 +1,10 @@
 #include <fcntl.h>
 #include <sys/stat.h>
 
-#include <algorithm>
 #include <filesystem>
 
 #include "delivery/cpp/package/http_store.h"
-#include "delivery/cpp/package/package_reader.h"
-#include "format/base/bytes.h"
 #include "format/base/descriptor.h"
-#include "format/base/errors.h"
-#include "format/container/layout.h"
 
 namespace texmesh {
 namespace {

@@ -1,8 +1,6 @@
 #include "delivery/cpp/simulate/simulation.h"
 
-#include <algorithm>
 #include <charconv>
-#include <limits>
 
 #include "format/base/portable_math.h"
 

@@ -1,6 +1,5 @@
 #include "delivery/cpp/transfer/transfer.h"
 
-#include <algorithm>
 #include <chrono>
 #include <deque>
 #include <thread>

@@ -1,7 +1,5 @@
 #include "delivery/cpp/transfer/transfer.h"
 
-#include <algorithm>
-
 namespace texmesh {
 namespace {
 

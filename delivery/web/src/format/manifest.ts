@@ -12,10 +12,8 @@ export { formatMajor, formatMinor };
 export const knownFeatures: readonly string[] = ['codec-jpeg-progressive', 'codec-jpeg-xy', 'codec-webp'];
 
 /** Where an entry's data stands in the container, and its digest. */
-export interface EntryRef {
+export interface EntryRef extends ByteRange {
   path: string;
-  offset: number;
-  bytes: number;
   sha256: Uint8Array;
   /** The rule of format/SPEC.md that bytes of another digest break; absent = I08. */
   rule?: string;
@@ -26,13 +24,7 @@ export interface PagedRef extends EntryRef {
   headSha256: Uint8Array;
 }
 /** Where the stream of vertex splits stands. */
-export interface StreamRef {
-  path: string;
-  offset: number;
-  bytes: number;
-  headBytes: number;
-  headSha256: Uint8Array;
-}
+export type StreamRef = Omit<PagedRef, 'sha256'>;
 /** The picture of the whole object, for lists and search engines. */
 export interface PosterRef extends EntryRef {
   widthPx: number;

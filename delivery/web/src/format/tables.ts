@@ -1,4 +1,4 @@
-import type { Manifest } from './manifest';
+import type { EntryRef, Manifest } from './manifest';
 import type { QualityTable } from './quality_table';
 import type { TextureInfo } from './textures';
 
@@ -63,11 +63,7 @@ export function bytesToShow(t: PlaneTables, rung: number, fragment: number): num
 }
 
 /** Where a plane's section stands within tables.bin, and its digest. */
-export interface TablesSection {
-  offset: number;
-  bytes: number;
-  sha256: Uint8Array;
-}
+export type TablesSection = Omit<EntryRef, 'path' | 'rule'>;
 /** Places and digests of the sections. */
 export interface TablesHead {
   minor: number;

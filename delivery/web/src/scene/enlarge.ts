@@ -3,6 +3,7 @@ import { ownLevels } from './plane_storage';
 import type { Upload } from './blocks/block_storage';
 import type { UploadQueue } from './upload_queue';
 import type { WorkerPool } from '../worker/pool';
+import type { PictureArea } from '../worker/protocol';
 
 // Enlarging for machines whose processor draws for want of a GPU, and for previews of coverage.
 
@@ -10,11 +11,7 @@ import type { WorkerPool } from '../worker/pool';
 const stripPx = 1 << 18;
 const mostPieces = 4;
 
-export interface Piece {
-  x0: number;
-  x1: number;
-  y0: number;
-  y1: number;
+export interface Piece extends PictureArea {
   /** Fragments in it, [from, to). */
   from: number;
   to: number;

@@ -8,19 +8,45 @@ export const ownLevels = 5;
 const linearFilter = 1006;
 
 /** The storage on the GPU of a plane: views for materials share it where their samplers are alike. */
-export class PlaneStorage {
-  private readonly gl_: WebGL2RenderingContext;
-  private readonly views_ = new Map<Texture, FramebufferTexture>(); // by the texture that each view is like
-  private readonly storages_ = new Map<WebGLTexture, number>(); // how many levels each has
-  private stale_ = false; // the smallest levels
+export class GpuStorage<View extends Texture> {
+  protected readonly gl_: WebGL2RenderingContext;
+  protected readonly views_ = new Map<Texture, View>(); // by the texture that each view is like
+  protected readonly storages_ = new Map<WebGLTexture, number>(); // how many levels each has
 
-  constructor(private readonly renderer_: WebGLRenderer, private readonly info_: TextureInfo) {
+  constructor(protected readonly renderer_: WebGLRenderer, protected readonly info_: TextureInfo) {
     this.gl_ = renderer_.getContext() as WebGL2RenderingContext;
   }
 
-  get textures(): Texture[] {
+  get textures(): View[] {
     return [...this.views_.values()];
   }
+  dispose(): void {
+    this.views_.forEach((view) => view.dispose());
+    this.views_.clear();
+    this.storages_.clear();
+  }
+
+  protected storageOf_(texture: Texture): WebGLTexture {
+    this.renderer_.initTexture(texture);
+    const { __webglTexture: storage } =
+      this.renderer_.properties.get(texture) as { __webglTexture?: WebGLTexture };
+    if (!storage) throw new Error('the renderer gave no texture');
+    return storage;
+  }
+  /** Levels of a picture whose mips a material's sampler asks for, or does not. */
+  protected levelsFor_({ minFilter }: Texture): number {
+    const { widthPx, heightPx } = this.info_;
+    return (minFilter as number) > linearFilter ? 32 - Math.clz32(Math.max(widthPx, heightPx)) : 1;
+  }
+  protected side_(px: number, level: number): number {
+    return Math.max(1, px >> level);
+  }
+}
+
+/** Storage of RGBA. */
+export class PlaneStorage extends GpuStorage<FramebufferTexture> {
+  private stale_ = false; // the smallest levels
+
   /** See PlaneComposer.view. `filled`: a new storage gets the picture of the others. */
   view(old: Texture, filled: boolean): Texture {
     const known = this.views_.get(old);
@@ -35,8 +61,7 @@ export class PlaneStorage {
     this.views_.set(old, texture);
     if (this.storages_.has(storage)) return texture;
     const [first] = this.storages_.keys();
-    this.storages_.set(storage,
-      texture.minFilter > linearFilter ? 32 - Math.clz32(Math.max(widthPx, heightPx)) : 1);
+    this.storages_.set(storage, this.levelsFor_(texture));
     if (first && filled) this.fill_(first, widthPx, heightPx, storage);
     return texture;
   }
@@ -78,22 +103,7 @@ export class PlaneStorage {
     });
     return pixels;
   }
-  dispose(): void {
-    this.views_.forEach((view) => view.dispose());
-    this.views_.clear();
-    this.storages_.clear();
-  }
 
-  private storageOf_(texture: Texture): WebGLTexture {
-    this.renderer_.initTexture(texture);
-    const { __webglTexture: storage } =
-      this.renderer_.properties.get(texture) as { __webglTexture?: WebGLTexture };
-    if (!storage) throw new Error('the renderer gave no texture');
-    return storage;
-  }
-  private side_(px: number, level: number): number {
-    return Math.max(1, px >> level);
-  }
   /** Runs `use` with framebuffers of its own, and leaves the renderer's state as it was. */
   private withBuffers_(use: () => void): void {
     const { gl_: gl } = this;

@@ -20,16 +20,19 @@ export interface DecodeRequest {
   /** Levels as blocks, made of the picture alone. */
   blocks?: BlockRequest;
 }
-/** x0 .. x1, y0 .. y1 (multiples of 16, or the end) of a picture enlarged bilinearly. Gives Levels. */
-export interface EnlargeRequest {
-  op: 'enlarge';
-  picture: ImageBitmap;
-  width: number;
-  height: number;
+/** x0 .. x1, y0 .. y1: multiples of 16, or the picture's end. */
+export interface PictureArea {
   x0: number;
   x1: number;
   y0: number;
   y1: number;
+}
+/** An area of a picture enlarged bilinearly. Gives Levels. */
+export interface EnlargeRequest extends PictureArea {
+  op: 'enlarge';
+  picture: ImageBitmap;
+  width: number;
+  height: number;
   levels: number;
   /** As for decode. */
   blocks?: BlockRequest;

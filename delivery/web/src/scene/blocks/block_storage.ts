@@ -7,7 +7,7 @@ import {
 } from '../../blocks/formats';
 import type { TextureInfo } from '../../format/textures';
 import type { Levels } from '../../worker/protocol';
-import { ownLevels } from '../plane_storage';
+import { GpuStorage, ownLevels } from '../plane_storage';
 import { threeFormats } from './gpu_formats';
 import { unpacked } from './two_channels';
 
@@ -50,8 +50,6 @@ export function readPicture(renderer: WebGLRenderer, texture: Texture, format: B
   return pixels;
 }
 
-/** Filters of three.js behind LinearFilter ask for mip levels. */
-const linearFilter = 1006;
 /** Texels of an upload: a megabyte at most, so that none takes more than a slice of a page's turn. */
 const bandPx = 1 << 18;
 
@@ -79,34 +77,28 @@ function alignedLevels({ fragmentWidthPx: width, fragmentHeightPx: height }: Tex
 }
 
 /** PlaneStorage of blocks. The smallest levels are made of a copy of the largest one of them. */
-export class BlockStorage {
+export class BlockStorage extends GpuStorage<CompressedTexture> {
   /** Levels that fragments bring as blocks. */
   readonly own: number;
-  private readonly gl_: WebGL2RenderingContext;
-  private readonly views_ = new Map<Texture, CompressedTexture>();
-  private readonly storages_ = new Map<WebGLTexture, number>(); // how many levels each has
   private readonly tail_: Pixels; // level `own`
   private stale_ = false;
   private making_?: Promise<void>;
   private disposed_ = false;
 
   constructor(
-    private readonly renderer_: WebGLRenderer,
-    private readonly info_: TextureInfo,
+    renderer: WebGLRenderer,
+    info: TextureInfo,
     readonly format: BlockFormat,
     private readonly host_: BlockHost,
     /** Fills a new storage with the picture of the others. */
     private readonly refill_: (from: Texture) => void,
   ) {
-    this.gl_ = renderer_.getContext() as WebGL2RenderingContext;
-    this.own = alignedLevels(info_);
-    const [width, height] = [this.side_(info_.widthPx, this.own), this.side_(info_.heightPx, this.own)];
+    super(renderer, info);
+    this.own = alignedLevels(info);
+    const [width, height] = [this.side_(info.widthPx, this.own), this.side_(info.heightPx, this.own)];
     this.tail_ = { width, height, pixels: new Uint8Array(4 * width * height) };
   }
 
-  get textures(): Texture[] {
-    return [...this.views_.values()];
-  }
   /** How a worker makes blocks of a picture whose place is x, y. */
   request(x: number, y: number): BlockRequest {
     const { widthPx, heightPx } = this.info_;
@@ -118,8 +110,7 @@ export class BlockStorage {
     const known = this.views_.get(old);
     if (known) return known;
     const { widthPx, heightPx, colourSpace } = this.info_;
-    const levelCount = (old.minFilter as number) > linearFilter ? 32 - Math.clz32(Math.max(widthPx, heightPx))
-      : 1;
+    const levelCount = this.levelsFor_(old);
     const mipmaps = Array.from({ length: levelCount }, (_, level) => ({ width: this.side_(widthPx, level),
       height: this.side_(heightPx, level), data: null as never }));
     const texture = new CompressedTexture(mipmaps, widthPx, heightPx, threeFormats[this.format]);
@@ -164,23 +155,11 @@ export class BlockStorage {
     return readPicture(this.renderer_, this.textures[0], this.format,
       { x: 0, y: 0, width: widthPx, height: heightPx, of: [widthPx, heightPx] });
   }
-  dispose(): void {
+  override dispose(): void {
     this.disposed_ = true;
-    this.views_.forEach((view) => view.dispose());
-    this.views_.clear();
-    this.storages_.clear();
+    super.dispose();
   }
 
-  private side_(px: number, level: number): number {
-    return Math.max(1, px >> level);
-  }
-  private storageOf_(texture: Texture): WebGLTexture {
-    this.renderer_.initTexture(texture);
-    const { __webglTexture: storage } =
-      this.renderer_.properties.get(texture) as { __webglTexture?: WebGLTexture };
-    if (!storage) throw new Error('the renderer gave no texture');
-    return storage;
-  }
   /** A level in rows of blocks, a band at a time. */
   private bands_({ width, height, data }: BlockLevel, level: number, left: number, top: number): Upload[] {
     const rows = Math.max(4, Math.floor(bandPx / width) & ~3);
