@@ -129,7 +129,7 @@ void Progress::started(std::size_t model, const std::string& output) {
 
 void Progress::event(std::size_t model, WorkerEvent event) {
   if (auto* told = std::get_if<SharesTold>(&event)) {
-    shares_ = std::move(told->shares);
+    running_[model].shares = std::move(told->shares);
     return;
   }
   std::visit(
@@ -150,11 +150,12 @@ void Progress::event(std::size_t model, WorkerEvent event) {
 void Progress::show(std::size_t model, const StageStarted& e) { running_[model].stage = e.stage; }
 
 void Progress::show(std::size_t model, const StageProgress& e) {
-  running_[model].partial[e.stage] = shares_[e.stage] * models_[model].weight * e.fraction;
+  Running& running = running_[model];
+  running.partial[e.stage] = running.shares[e.stage] * models_[model].weight * e.fraction;
 }
 
 void Progress::show(std::size_t model, const StageFinished& e) {
-  const double part = shares_[e.stage] * models_[model].weight;
+  const double part = running_[model].shares[e.stage] * models_[model].weight;
   running_[model].partial.erase(e.stage);
   running_[model].fraction += part;
   done_weight_ += part;

@@ -46,6 +46,7 @@ class Progress {
     std::chrono::steady_clock::time_point start;
     double fraction = 0;                    // of its weight: stages that are done
     std::map<std::string, double> partial;  // and of stages that are not: how far they are
+    std::map<std::string, double> shares;   // of its weight, by stage
   };
   struct Forecast {
     std::size_t hits = 0, running = 0, waiting = 0;  // stages
@@ -78,7 +79,6 @@ class Progress {
   OutputMode mode_;
   bool verbose_, explain_;
   std::vector<ProgressModel> models_;
-  std::map<std::string, double> shares_;  // of a model's time, by stage
   std::map<std::size_t, Running> running_;
   std::size_t finished_count_ = 0, told_again_ = 0;
   std::map<std::size_t, Forecast> forecasts_;

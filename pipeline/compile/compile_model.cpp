@@ -63,6 +63,13 @@ struct ProvenanceInput {
   }
 };
 
+ModelSize size_of(const Model& model) {
+  ModelSize size{0, 0, static_cast<double>(model.images.size())};
+  for (const Image& image : model.images) size.megapixels += 1e-6 * image.width_px * image.height_px;
+  size.triangles = static_cast<double>(model.mesh.triangles.size());
+  return size;
+}
+
 /// The model file with the files it refers to. Which those are is known only after an import, so the store
 /// remembers the list of the last one (as ccache's manifest does): while every file on it reads as it did,
 /// import need not run.
@@ -72,6 +79,7 @@ class ModelSource {
       : path_(request.input),
         options_(request.options.import),
         memory_bytes_(request.memory_bytes),
+        size_known_(request.size_known),
         links_within_(request.links_within),
         known_(request.known) {}
 
@@ -226,6 +234,7 @@ class ModelSource {
       refuse_too_large(path_.filename().string(), bytes_, memory_bytes_);
       ImportedModel m = import_model(path_.filename().string(), bytes_, resolver, options, context);
       requests = resolver.requests();
+      if (size_known_) size_known_(size_of(m.model));
       if (is_archive() && !archived_) read_archived_notes();
       forget_bytes();
       return m;
@@ -244,6 +253,7 @@ class ModelSource {
   std::filesystem::path path_;
   ImportOptions options_;  // of open()
   std::uint64_t memory_bytes_ = 0;
+  std::function<void(const ModelSize&)> size_known_;
   std::vector<std::string> links_within_;
   std::vector<FileRequest> known_;
   Bytes bytes_;

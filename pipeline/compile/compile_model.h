@@ -25,6 +25,8 @@ struct CompileRequest {
   StageExplainer explainer;  // may be empty
   // Called when compiling fails, with the files that were looked at. The same files fail again.
   std::function<void(const std::vector<FileRequest>&)> files_of_failure;
+  // Called when the model is imported.
+  std::function<void(const ModelSize&)> size_known;
 };
 
 struct CompileOutcome {

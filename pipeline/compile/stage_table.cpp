@@ -103,8 +103,8 @@ Stage stage(StageTitle title, Read read, Made made, Declared declared,
 
 /// Waits for the skeleton only where R(v) is the signal.
 Stage scale_space_stage(const CompileOptions& o) {
-  const StageTitle title{"ssf", kSsfVersion,
-                         "mesh -> scale map: the highest scale at which a vertex is a feature", .025};
+  const StageTitle title{
+      "ssf", kSsfVersion, "mesh -> scale map: the highest scale at which a vertex is a feature", {.01, .62}};
   if (o.ssf.signal == ScaleSignal::kRadius)
     return stage(title, inputs(kImportedMesh, kConditionedMesh, kSkeleton), outputs(kScaleMap),
                  read_of(o, o.ssf), {}, filter_radius);
@@ -132,10 +132,10 @@ Results<ConditionedMesh, Materials, Images> chart_import(const ConditionedMesh& 
 }
 
 Stage atlas_stage(const CompileOptions& o) {
-  return stage({"atlas", kAtlasVersion, "mesh, images -> few large charts with the source's texels", .1},
-               inputs(kConditionedMesh, kMaterials, kImages),
-               outputs(kChartedMesh, kChartedMaterials, kChartedImages), read_of(o, o.atlas), kImageLibraries,
-               chart_import);
+  return stage(
+      {"atlas", kAtlasVersion, "mesh, images -> few large charts with the source's texels", {.2, 4, 1}},
+      inputs(kConditionedMesh, kMaterials, kImages), outputs(kChartedMesh, kChartedMaterials, kChartedImages),
+      read_of(o, o.atlas), kImageLibraries, chart_import);
 }
 
 AtlasSample sample_source(const ConditionedMesh& mesh, const Materials& materials, const Images& images,
@@ -152,7 +152,7 @@ std::vector<Stage> with_atlas(std::vector<Stage> table, const CompileOptions& o)
 
 Stage scales_stage(const CompileOptions& o) {
   const Shown shown = shown_with(o);
-  return stage({"scales", kScalesVersion, "kept scales -> GLB files, vertex splits", .03},
+  return stage({"scales", kScalesVersion, "kept scales -> GLB files, vertex splits", {.01, .5}},
                inputs(kNestedScales, kPerceptualValues, shown.materials, shown.images, kFragments, kPreviews),
                outputs(kScaleFiles), read_of(o, o.scales),
                {"draco", "libjpeg-turbo", "meshoptimizer", "zlib"}, write_scales);
@@ -160,17 +160,19 @@ Stage scales_stage(const CompileOptions& o) {
 
 Stage gltf_scales_stage(const CompileOptions& o) {
   const Shown shown = shown_with(o);
-  return stage(
-      {"gltf_scales", kGltfScalesVersion, "scales of the step function -> GLBs for viewers of glTF", .02},
-      inputs(kNestedScales, kPerceptualValues, shown.materials, shown.images, kFragments, kFilledPlanes,
-             kPreviews, kTables, kScaleFiles, kQuality),
-      outputs(kGltfScales), read_of(o, o.scales), {"draco", "libjpeg-turbo", "meshoptimizer", "zlib"},
-      write_gltf_scales);
+  return stage({"gltf_scales",
+                kGltfScalesVersion,
+                "scales of the step function -> GLBs for viewers of glTF",
+                {.01, .26}},
+               inputs(kNestedScales, kPerceptualValues, shown.materials, shown.images, kFragments,
+                      kFilledPlanes, kPreviews, kTables, kScaleFiles, kQuality),
+               outputs(kGltfScales), read_of(o, o.scales),
+               {"draco", "libjpeg-turbo", "meshoptimizer", "zlib"}, write_gltf_scales);
 }
 
 Stage package_stage(const CompileOptions& o) {
   return stage(
-      {"package", kPackageVersion, "everything -> the container", .01},
+      {"package", kPackageVersion, "everything -> the container", {.01, .06, .02}},
       inputs(kNestedScales, kPerceptualValues, shown_with(o).images, kFragments, kLadder, kPreviews, kTables,
              kThesisTables, kScaleFiles, kGltfScales, kQuality, kPoster, kProxies, kSourceAbout, kProvenance),
       outputs(kPackage), read_of(o, o.package, o.perceptual_values.jnd, o.import.up), {}, package_all);
@@ -181,55 +183,74 @@ Stage package_stage(const CompileOptions& o) {
 std::vector<Stage> stage_table(const CompileOptions& o) {
   const Shown shown = shown_with(o);
   std::vector<Stage> table{
-      stage({"import", kImportVersion, "file -> mesh, materials, images, what it says of itself", .02},
+      stage({"import", kImportVersion, "file -> mesh, materials, images, what it says of itself", {.01, .02}},
             inputs(kSource), outputs(kImportedMesh, kMaterials, kImages, kSourceAbout), read_of(o, o.import),
             {"draco", "libpng", "libzstd", "meshoptimizer", "openimageio", "tinygltf", "zlib"},
             import_source),
-      stage({"condition", kConditionVersion,
-             "mesh -> 2-manifold mesh: weld, drop degenerates, split, components", .01},
+      stage({"condition",
+             kConditionVersion,
+             "mesh -> 2-manifold mesh: weld, drop degenerates, split, components",
+             {.01, .12}},
             inputs(kImportedMesh), outputs(kConditionedMesh), read_of(o, o.condition), {}, condition_import),
-      stage({"skeletonization", kSkeletonizationVersion, "mesh -> curve skeleton, R(v)", .04},
+      stage({"skeletonization", kSkeletonizationVersion, "mesh -> curve skeleton, R(v)", {1.3}},
             inputs(kConditionedMesh), outputs(kSkeleton), read_of(o, o.skeletonization),
             {"cgal", "meshoptimizer"}, skeletonize),
       scale_space_stage(o),
-      stage({"simplification", kSimplificationVersion, "mesh, scale map -> collapse sequence, nested scales",
-             .01},
+      stage({"simplification",
+             kSimplificationVersion,
+             "mesh, scale map -> collapse sequence, nested scales",
+             {.01, .95}},
             inputs(shown.mesh, kScaleMap), outputs(kNestedScales), read_of(o, o.simplification), {},
             simplify),
-      stage({"perceptual_values", kPerceptualValuesVersion,
-             "scales, R -> perceptual values, major scales, step function", .025},
+      stage({"perceptual_values",
+             kPerceptualValuesVersion,
+             "scales, R -> perceptual values, major scales, step function",
+             {.07, .38}},
             inputs(kNestedScales, kSkeleton), outputs(kPerceptualValues), read_of(o, o.perceptual_values), {},
             measure_perceptual_values),
-      stage({"fragmentation", kFragmentationVersion, "images, mesh -> grids, coverage, feature counts, eta",
-             .015},
+      stage({"fragmentation",
+             kFragmentationVersion,
+             "images, mesh -> grids, coverage, feature counts, eta",
+             {.01, .12, .02}},
             inputs(shown.mesh, shown.materials, shown.images, kScaleMap), outputs(kFragments),
             read_of(o, o.fragmentation), {"openimageio"}, fragment_textures),
-      stage({"fill", kFillVersion, "images, coverage -> filled texels (derived, never stored)", .03},
-            inputs(kFragments, shown.images), derived(kFilledPlanes),
-            read_of(o, o.fragmentation.fill, o.ladder.mode, o.ladder.uncovered),
-            {"libjpeg-turbo", "libpng", "openimageio"}, fill_fragments),
-      stage({"zim", kZimVersion, "fragments -> predictors Z, I, M, VQP", .015},  //
+      stage(
+          {"fill", kFillVersion, "images, coverage -> filled texels (derived, never stored)", {.01, 0, .37}},
+          inputs(kFragments, shown.images), derived(kFilledPlanes),
+          read_of(o, o.fragmentation.fill, o.ladder.mode, o.ladder.uncovered),
+          {"libjpeg-turbo", "libpng", "openimageio"}, fill_fragments),
+      stage({"zim", kZimVersion, "fragments -> predictors Z, I, M, VQP", {.01, 0, .11}},  //
             inputs(kFragments, kFilledPlanes), outputs(kPredictors), read_of(o, o.zim), {}, predict_quality),
-      stage({"previews", kPreviewsVersion, "fragments -> a small JPEG of every texture", .005},
+      stage({"previews", kPreviewsVersion, "fragments -> a small JPEG of every texture", {.01, 0, .02}},
             inputs(kFragments, kFilledPlanes), outputs(kPreviews),
             read_of(o, o.ladder.preview_quality, o.ladder.subsampling), {"libjpeg-turbo"}, preview_fragments),
-      stage({"ladder", kLadderVersion, "fragments, previews -> rungs of streams in the chosen codec", .08},
+      stage({"ladder",
+             kLadderVersion,
+             "fragments, previews -> rungs of streams in the chosen codec",
+             {.01, .26, .51, .1}},
             inputs(kFragments, kFilledPlanes, kPreviews, shown.images), outputs(kLadder),
             read_of(o, o.ladder), {"libjpeg-turbo", "libwebp"}, encode_ladder),
-      stage({"lut", kLutVersion, "fragments, predictors, ladder, previews -> quality and size tables", .05},
+      stage({"lut",
+             kLutVersion,
+             "fragments, predictors, ladder, previews -> quality and size tables",
+             {.01, 0, .27}},
             inputs(kFragments, kFilledPlanes, kPredictors, kLadder, kPreviews),
             outputs(kTables, kThesisTables), read_of(o, o.lut), {"libjpeg-turbo", "libwebp"},
             measure_fragments),
       scales_stage(o),
-      stage({"quality", kQualityVersion, "scales, rungs -> losses of lit pictures, switch sizes", .52},
+      stage({"quality",
+             kQualityVersion,
+             "scales, rungs -> losses of lit pictures, switch sizes",
+             {2.3, .76, 1.2, .44}},
             inputs(kNestedScales, kPerceptualValues, shown.materials, shown.images, kFragments, kFilledPlanes,
                    kLadder, kPreviews, kTables),
             outputs(kQuality), read_of(o, o.quality), kImageLibraries, measure_quality),
       gltf_scales_stage(o),
-      stage({"poster", kPosterVersion, "S_0 with the source's texels -> a picture of the object", .02},
+      stage({"poster", kPosterVersion, "S_0 with the source's texels -> a picture of the object", {.16}},
             inputs(kNestedScales, shown.materials, kFragments, kFilledPlanes), outputs(kPoster),
             read_of(o, o.poster), {"libjpeg-turbo"}, make_poster),
-      stage({"proxies", kProxiesVersion, "S_0 -> small GLBs with atlases and textures of their own", .075},
+      stage({"proxies", kProxiesVersion, "S_0 -> small GLBs with atlases and textures of their own",
+             o.proxies.mode == ProxyMode::kNone ? StageTime{.01} : StageTime{.01, 0, .21, .61, 8.9}},
             inputs(kNestedScales, shown.materials, shown.images, kFragments, kFilledPlanes),
             outputs(kProxies), read_of(o, o.proxies), {"draco", "libwebp", "meshoptimizer"}, make_proxies),
       package_stage(o),
@@ -239,14 +260,24 @@ std::vector<Stage> stage_table(const CompileOptions& o) {
 
 Stage atlas_choice_stage(const CompileOptions& o) {
   const bool keeps = o.atlas.mode == AtlasMode::kKeep;
-  const StageTitle title{keeps ? "atlas_choice" : "atlas_choice_rebuilt", kAtlasChoiceVersion,
-                         "source, nested scales -> lit pictures for the bytes of loads", .05};
+  const StageTitle title{keeps ? "atlas_choice" : "atlas_choice_rebuilt",
+                         kAtlasChoiceVersion,
+                         "source, nested scales -> lit pictures for the bytes of loads",
+                         {2, 1}};
   if (keeps)
     return stage(title, inputs(kConditionedMesh, kMaterials, kImages, kNestedScales, kProxies),
                  outputs(kAtlasSample), Options<>{}, kImageLibraries, sample_source);
   return stage(
       title, inputs(kConditionedMesh, kMaterials, kImages, kNestedScales, kChartedMaterials, kChartedImages),
       outputs(kAtlasSample), Options<>{}, kImageLibraries, sample_atlas);
+}
+
+std::map<std::string, double> time_shares(const std::vector<Stage>& table, const ModelSize& size) {
+  std::map<std::string, double> shares;
+  double all = 0;
+  for (const Stage& stage : table) all += shares[stage.name] = stage.time.of(size);
+  for (auto& [stage, share] : shares) share /= all;
+  return shares;
 }
 
 const std::vector<Stage>& default_stage_table() {

@@ -270,9 +270,14 @@ std::vector<KeptProxy> kept_proxies(const ProxySubject& subject, const NestedSca
     kept.push_back({std::move(*best.made), best.flip});
     return nullptr;
   };
+  // A size takes about as long as its square root says; pictures of those that stay come after them.
+  constexpr double kForSizes = .9;
+  double done = 0, all = 0;
+  for (const int bytes : sizes) all += std::sqrt(bytes);
   for (std::size_t i = 0; i < sizes.size(); ++i) {
     if (const char* why = add(sizes[i])) note_none(notes, sizes[i], why);
-    context.report(static_cast<double>(i + 1) / static_cast<double>(sizes.size()));
+    done += std::sqrt(sizes[i]);
+    context.report(kForSizes * done / all);
   }
   // A smallest proxy that loses goes with those that it is shown before.
   if (learned.smallest_loses && kept.size() == 1) {

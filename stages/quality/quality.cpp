@@ -147,7 +147,7 @@ void judge_size(const SizeCells& cells, const Height& height, const TextureSampl
 
 /// What a height costs beside the others, about: those of the table are rendered with many textures.
 double cost_of(const Height& height) {
-  constexpr double kUnranked = 0.25, kRanks[] = {2.4, 4, 3.2};
+  constexpr double kUnranked = 0.3, kRanks[] = {3.5, 1.5, 3};
   return height.rank ? kRanks[std::min(*height.rank, std::size(kRanks) - 1)] : kUnranked;
 }
 
@@ -156,8 +156,8 @@ std::vector<SizeCells> render_heights(const TextureSampler& sampler, const Quali
                                       const RunContext& context) {
   const std::vector<Height> heights = heights_below(options.largest_px, fewer);
   std::vector<SizeCells> table_cells;
-  constexpr double kBefore = 0.8;  // looking around, as costs are counted
-  double all = kBefore, done = kBefore;
+  constexpr double kBefore = 0.9, kAfter = 0.2;  // looking around, fitting the table, as costs are counted
+  double all = kBefore + kAfter, done = kBefore;
   for (const Height& height : heights) all += cost_of(height);
   RunContext quiet = context;
   quiet.progress = nullptr;

@@ -265,7 +265,7 @@ struct LayerLeftOut {
   static void fields(auto& s, auto&& v) { v("layer", s.layer, ""); }
 };
 
-/// For the run alone: each stage's share of a model's time (Stage::time_share).
+/// For the run alone: each stage's share of a model's time (time_shares()).
 struct SharesTold {
   static constexpr const char* kEvent = "shares";
   std::string model;

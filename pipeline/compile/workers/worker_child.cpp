@@ -165,9 +165,11 @@ int compile(const WorkerTask& task, EventWriter& events) {
   context.threads = task.threads;
   context.cancelled = &g_cancelled;
   const std::unique_ptr<Store> store = store_of(task);
-  SharesTold told;
-  for (const Stage& stage : default_stage_table()) told.shares[stage.name] = stage.time_share;
-  events.write(told);
+  request.size_known = [&events,
+                        table = stage_table(resolve_options(request.options))](const ModelSize& size) {
+    events.write(SharesTold{"", time_shares(table, size)});
+  };
+  request.size_known(ModelSize{});
   if (task.job.forecast) {
     for (const auto& [stage, explanation] : forecast_model(request, *store, context))
       events.write(StageExplained{"", stage, explanation});

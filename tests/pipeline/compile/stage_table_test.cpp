@@ -28,13 +28,27 @@ TEST(StageTable, EveryInputIsMadeBeforeItIsUsedAndEveryOptionIsRead) {
 }
 
 /// A stage without a share would let the progress bar stand still.
-TEST(StageTable, EveryStageSaysItsShareOfTheTime) {
-  double all = 0;
-  for (const Stage& s : default_stage_table()) {
-    EXPECT_GT(s.time_share, 0) << s.name;
-    all += s.time_share;
+TEST(StageTable, EveryStageHasAShareOfTheTimeWhateverTheModel) {
+  for (const ModelSize& size : {ModelSize{}, ModelSize{0, 0, 0}, ModelSize{1e7, 1000, 220}}) {
+    double all = 0;
+    for (const auto& [stage, share] : time_shares(default_stage_table(), size)) {
+      EXPECT_GT(share, 0) << stage;
+      all += share;
+    }
+    EXPECT_NEAR(all, 1, 1e-9);
   }
-  EXPECT_NEAR(all, 1, 1e-9);
+}
+
+/// Proxies of a large scan take as long as all else.
+TEST(StageTable, SharesFollowTheModel) {
+  const auto proxies = [](double triangles, ProxyMode mode) {
+    CompileOptions o;
+    o.proxies.mode = mode;
+    return time_shares(stage_table(o), {triangles, 16, 2}).at("proxies");
+  };
+  EXPECT_GT(proxies(150e3, ProxyMode::kAuto), .3);
+  EXPECT_LT(proxies(10e3, ProxyMode::kAuto), .2);
+  EXPECT_LT(proxies(150e3, ProxyMode::kNone), .01);
 }
 
 /// Without an atlas of its own a package has the bytes that it had before there was such a stage.

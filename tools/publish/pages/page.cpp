@@ -36,12 +36,12 @@ std::string filled(std::string_view text, const TemplateValues& values) {
 std::string html_page(const std::string& title, const std::string& body) {
   const std::span<const BuiltInFile> files = pages_page_files();
   return std::string(kReportFirstLine) +
-         filled(
-             built_in_text(files, "report.html"),
-             {{"beginning",
-               page_beginning(title, "default-src 'none'; img-src 'self' file:; style-src 'unsafe-inline'")},
-              {"style", page_style(built_in_text(files, "report.css"))},
-              {"body", body}});
+         filled(built_in_text(files, "report.html"),
+                {{"beginning",
+                  page_beginning(
+                      title, "default-src 'none'; img-src 'self' file: data:; style-src 'unsafe-inline'")},
+                 {"style", page_style(built_in_text(files, "report.css"))},
+                 {"body", body}});
 }
 
 std::string html_section(const std::string& id, const std::string& heading, const std::string& body) {
