@@ -201,7 +201,8 @@ void add_method_arguments(Command& c, MethodArguments& args) {
            "systems read")
       .required();
   c.option("--thesis", args.thesis, "The package of --profile thesis, where INPUT is a package", "PKG");
-  c.option("--against", args.against, "The model, where INPUT is a package", "MODEL");
+  c.option("--against", args.against, "The model, for the source's texels, where INPUT is a package",
+           "MODEL");
   c.option("--display", args.displays_px, "Displayed heights, px")
       .separated_by(',')
       .integer_in(16, 2048)
@@ -229,8 +230,8 @@ void add_method_study(Command& study) {
       "  texmesh-lab study method turtle.texmesh --thesis printed.texmesh --against turtle.glb --json");
   c.notes(
       "thesis: the package of --profile thesis, read with --policy thesis. texmesh: defaults on both sides. FLIP "
-      "is of lit pictures against the source, 0 = equal: of what is shown, of the scale with the best rungs, of "
-      "S_0 with the textures. Of a proxy, which has textures of its own, the last is the first.\n"
+      "is of lit pictures against S_0 with the source's texels, 0 = equal: of what is shown, of the scale with "
+      "the source's texels, of S_0 with the textures. Of a proxy, which has textures of its own, the last is the first.\n"
       "\"end s\" is over the link as told. Bursts: ten links of that mean whose rate varies by half of it "
       "(correlation 0.9 between tenths of a second); how late the last fragment is, and how far from the limit.\n"
       "Exit code: 0, 1 when a file cannot be read or compiled, 2 usage, 3 internal error.");

@@ -253,17 +253,19 @@ void add_prediction_study(Command& study) {
   c.option("--display", args.display_px, "Displayed height with --budget, px")
       .number_in(16, 2048)
       .shows_default();
-  c.option("--against", args.against,
-           "The model file that the package was made from; without it S_0 with the best rungs stands for it",
-           "MODEL");
+  c.option(
+      "--against", args.against,
+      "The model file that the package was made from, for the source's texels; without it the best rungs "
+      "stand for them",
+      "MODEL");
   c.option("--views", args.views, "Directions that are rendered").integer_in(1, 64).shows_default();
   add_jobs_and_json_options(c, args.jobs, args.json);
   c.examples(
       "  texmesh-lab study prediction turtle.texmesh --against turtle.glb --plans 20 --seed 7\n"
       "  texmesh-lab study prediction turtle.texmesh --against turtle.glb --budget 200kB --budget 1MB");
   c.notes(
-      "FLIP is of lit pictures against the source, 0 = equal: of the plan, of its scale with the best rungs, of "
-      "S_0 with its textures.\n"
+      "FLIP is of lit pictures against S_0 with the source's texels, 0 = equal: of the plan, of its scale "
+      "with the source's texels, of S_0 with its textures.\n"
       "Exit code: 0, 1 when a file cannot be read, 2 usage.");
 }
 
