@@ -54,6 +54,7 @@ int main(int argc, char** argv) {
   using namespace texmesh;
   const std::string first_word = argc > 1 ? argv[1] : "";
   if (argc == 2 && first_word == "worker") return worker_main();
+  if (argc == 2 && first_word == "worker-origin") return worker_origin_main();
   serve_workers();
 
   CommandLine line("texmesh compiles textured 3D scans into packages that any static web server can stream.");

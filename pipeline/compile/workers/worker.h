@@ -1,4 +1,5 @@
 #pragma once
+#include <chrono>
 #include <map>
 #include <memory>
 #include <variant>
@@ -353,8 +354,35 @@ struct PoolSettings {
   bool stop_on_failure = false;  // no further child starts after a failure
 };
 
-/// Compiles the jobs, each in a fresh child process of texmesh (posix_spawn, never a fork of a threaded
-/// parent). Returns a report per job, in the order of the jobs.
+/// A running child process. Its owner waits for `pid` and closes the descriptors.
+struct ChildProcess {
+  pid_t pid = -1;
+  int out = -1, err = -1;  // its standard output and error; reading them does not block
+  std::chrono::steady_clock::time_point start;
+};
+
+/// Where the workers of a run come from. Where there are several, `texmesh worker-origin` loads its libraries
+/// once, which takes a start 20 ms, and each worker is a copy of it as it was then: it has read no model, so
+/// nothing of one comes to another. Its children are this process's. Not for concurrent use.
+class WorkerOrigin {
+ public:
+  explicit WorkerOrigin(std::size_t workers);
+  ~WorkerOrigin();
+  WorkerOrigin(const WorkerOrigin&) = delete;
+  WorkerOrigin& operator=(const WorkerOrigin&) = delete;
+  /// A worker that reads `input` as the whole of its standard input, in worker_environment(). One with large
+  /// pages, and all where the origin is gone, are started anew. Throws std::runtime_error.
+  ChildProcess start(const std::string& input, bool large_pages);
+
+ private:
+  pid_t copy(const std::array<int, 3>& files);
+  void end();
+  pid_t pid_ = -1;
+  int socket_ = -1;
+};
+
+/// Compiles the jobs, each in a child process of its own (WorkerOrigin). Returns a report per job, in the
+/// order of the jobs.
 /// - Jobs that are predicted to take longest start first. At most `processors` run side by side, fewer when
 ///   the predicted peaks do not fit the memory; one always runs. The last jobs get the free processors as
 ///   threads.
@@ -375,5 +403,8 @@ std::vector<std::string> worker_environment(bool large_pages);
 /// The worker's side of compiling in child processes: reads a task from standard input, writes event lines to
 /// standard output, returns the exit code.
 int worker_main();
+
+/// `texmesh worker-origin`: copies itself for every message on its standard input, a socket, until that ends.
+int worker_origin_main();
 
 }  // namespace texmesh

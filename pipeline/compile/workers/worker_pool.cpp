@@ -2,7 +2,6 @@
 #include <fcntl.h>
 #include <poll.h>
 #include <signal.h>
-#include <spawn.h>
 #include <sys/resource.h>
 #include <sys/wait.h>
 
@@ -18,70 +17,10 @@
 #include "pipeline/io/exit_codes.h"
 #include "pipeline/io/program.h"
 
-extern char** environ;
-
 namespace texmesh {
-
-std::vector<std::string> worker_environment(bool large_pages) {
-  std::vector<std::string> variables;
-  for (char** variable = environ; variable && *variable; ++variable) variables.emplace_back(*variable);
-  if (large_pages && !::getenv("GLIBC_TUNABLES"))
-    variables.emplace_back("GLIBC_TUNABLES=glibc.malloc.hugetlb=1");
-  return variables;
-}
-
 namespace {
 
 using Clock = std::chrono::steady_clock;
-
-/// A running child process. Its owner waits for `pid` and closes the descriptors.
-struct ChildProcess {
-  pid_t pid = -1;
-  int out = -1, err = -1;  // its standard output and error; reading them does not block
-  Clock::time_point start;
-};
-
-struct Pipe {
-  int read = -1, write = -1;
-  Pipe() {
-    int fds[2];
-    if (::pipe2(fds, O_CLOEXEC) != 0) throw std::runtime_error(std::string("pipe: ") + std::strerror(errno));
-    read = fds[0];
-    write = fds[1];
-  }
-};
-
-/// Starts `texmesh worker` (posix_spawn, never a fork of a threaded parent) in worker_environment() and
-/// gives it `input` as the whole of its standard input. Throws std::runtime_error.
-ChildProcess start_worker_process(const std::string& input, bool large_pages) {
-  static const std::string executable = worker_executable();
-  std::vector<std::string> variables = worker_environment(large_pages);
-  std::vector<char*> environment;
-  for (std::string& variable : variables) environment.push_back(variable.data());
-  environment.push_back(nullptr);
-  ChildProcess child;
-  Pipe in, out, err;
-  posix_spawn_file_actions_t actions;
-  posix_spawn_file_actions_init(&actions);
-  posix_spawn_file_actions_adddup2(&actions, in.read, 0);
-  posix_spawn_file_actions_adddup2(&actions, out.write, 1);
-  posix_spawn_file_actions_adddup2(&actions, err.write, 2);
-  std::string name = "texmesh", command = "worker";
-  char* argv[] = {name.data(), command.data(), nullptr};
-  const int rc = ::posix_spawn(&child.pid, executable.c_str(), &actions, nullptr, argv, environment.data());
-  posix_spawn_file_actions_destroy(&actions);
-  ::close(in.read);
-  ::close(out.write);
-  ::close(err.write);
-  if (rc != 0) throw std::runtime_error(std::string("cannot start a worker: ") + std::strerror(rc));
-  write_all(in.write, text_bytes(input));  // a child that is gone says the rest by its exit status
-  ::close(in.write);
-  child.out = out.read;
-  child.err = err.read;
-  for (int fd : {child.out, child.err}) ::fcntl(fd, F_SETFL, O_NONBLOCK);
-  child.start = Clock::now();
-  return child;
-}
 
 /// Appends what can be read now; false at the end of the file.
 bool read_available(int fd, std::string& into) {
@@ -236,6 +175,7 @@ class WorkerPool {
         limits_(settings.limits),
         sink_(sink),
         finished_(finished),
+        origin_(jobs.size()),
         reports_(jobs.size()),
         waiting_(start_order(jobs)) {
     for (WorkerReport& r : reports_) r.result = ModelResult::kCancelled;
@@ -285,8 +225,8 @@ class WorkerPool {
     worker.job = index;
     worker.lane = free_lane();
     worker.temporary = job.output.empty() || job.forecast ? "" : temporary_name(job.output, index);
-    worker.process = start_worker_process(to_json_line(task_of(job, worker.temporary, threads)),
-                                          job.predicted_memory_bytes >= kLargeModel_bytes);
+    worker.process = origin_.start(to_json_line(task_of(job, worker.temporary, threads)),
+                                   job.predicted_memory_bytes >= kLargeModel_bytes);
     reports_[index].lane = worker.lane;
     reports_[index].start_s = now_s();
     return worker;
@@ -380,6 +320,7 @@ class WorkerPool {
   const WorkerLimits& limits_;
   const EventSink& sink_;
   const FinishSink& finished_;
+  WorkerOrigin origin_;
   std::vector<WorkerReport> reports_;
   std::vector<std::size_t> waiting_;
   std::vector<Worker> workers_;

@@ -155,6 +155,25 @@ TEST_F(Hostile, TheFixturesThemselvesAreFine) {
   EXPECT_EQ(r.exit_code, 0) << r.output << r.errors;
 }
 
+/// Workers of several models are copies of one process (WorkerOrigin).
+TEST_F(Hostile, AModelThatFailsChangesNothingOfTheNext) {
+  write_text(in("t.png"), kPng);
+  Json broken = tetrahedron();
+  broken["accessors"][2]["count"] = 4000;
+  for (const char* name : {"a", "c", "d"}) write_text(in(name) + std::string(".gltf"), tetrahedron().dump());
+  write_text(in("b.gltf"), broken.dump());
+  const CommandResult r = run_command(
+      {TEXMESH_BINARY, "compile", folder_ / "in", "-o", folder_ / "all", "--no-cache", "--jobs", "1"}, {}, "",
+      60);
+  EXPECT_EQ(r.exit_code, 1) << r.output << r.errors;
+  EXPECT_FALSE(fs::exists(folder_ / "all/b.texmesh"));
+  for (const std::string name : {"a", "c", "d"}) {
+    ASSERT_EQ(compile(name + ".gltf").exit_code, 0);
+    EXPECT_EQ(read_text(folder_ / ("all/" + name + ".texmesh")), read_text(folder_ / "out/x.texmesh"))
+        << name;
+  }
+}
+
 TEST_F(Hostile, MissingFile) { expect_refused("nothing.glb"); }
 TEST_F(Hostile, EmptyFiles) {
   for (const char* name : {"e.glb", "e.gltf", "e.obj", "e.ply", "e.stl", "e.xyz"}) {
