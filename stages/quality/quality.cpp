@@ -197,9 +197,11 @@ PictureLosses finer_along(const PictureLosses& finer, const GroupCells& smaller,
   return out;
 }
 
-// Of models of few texels and triangles: what is left at twice the height of what finer texels lose by
-// charts' borders (.3 to .7).
-constexpr float kSeamsLeft = 0.5f;
+// Of models of few texels and triangles, fitted over six made ones and four scans cut to 1,500 to 2,300
+// triangles (docs/decisions/quality-table.md): how losses add up (2.0 to 2.5), the error of what is predicted
+// for plans of ten others, and what is left at twice the height of what finer texels lose by charts' borders
+// (.3 to .7).
+constexpr float kFewExponent = 2.15f, kFewError = 0.1f, kSeamsLeft = 0.5f;
 
 /// What the knots of all groups and the scales lose at one size, rendered or not.
 struct RawLosses {
@@ -334,29 +336,15 @@ MeasuredQuality measure_quality(const NestedScales& scales, const PerceptualValu
   const TextureSampler sampler{data, shown, groups, options.rung_samples,
                                surface_area(scales.mesh, scales.scales[0].triangles)};
   SwitchSizes switch_sizes(kept.numbers.size(), options);
-  // Who asks for more views than usual wants pictures, not what usually follows from fewer.
   const std::size_t fewer =
-      options.views > QualityOptions{}.views
-          ? 0
-          : fewer_heights(sampler, scales.scales[0].triangles.size(), studio.frame.extent, options);
+      fewer_heights(sampler, scales.scales[0].triangles.size(), studio.frame.extent, options);
   studio.few = fewer > 0;
-  studio.one_row = fewer + 1 == kTextureSizes && shown.with_mips();
+  const std::vector<SizeCells> cells = render_heights(sampler, options, fewer, studio, switch_sizes, context);
   result.table.views = static_cast<std::uint32_t>(options.views);
   result.table.scales = kept.numbers;
-  SizeCells last;
-  if (studio.one_row) {
-    const double row_px = std::ldexp(options.largest_px, -static_cast<int>(fewer));
-    OneRow rendered = render_row(sampler, row_px, studio, context);
-    fill_from_row(rendered, row_px, groups, result.table);
-    result.display_px_flip = one_row_switch_px(rendered, limits_at(row_px, options), options);
-    last = std::move(rendered.row);
-  } else {
-    std::vector<SizeCells> cells = render_heights(sampler, options, fewer, studio, switch_sizes, context);
-    fill_table(cells, groups, studio.few, result.table);
-    result.display_px_flip = switch_sizes.display_px();
-    last = std::move(cells.back());
-  }
-  for (std::size_t i = 0; i < fewer; ++i) enlarge(texel_levels(last, i), result.table);
+  fill_table(cells, groups, studio.few, result.table);
+  for (std::size_t i = 0; i < fewer; ++i) enlarge(texel_levels(cells.back(), i), result.table);
+  result.display_px_flip = switch_sizes.display_px();
   return result;
 }
 

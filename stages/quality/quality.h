@@ -10,7 +10,7 @@
 
 namespace texmesh {
 
-inline constexpr int kQualityVersion = 23;
+inline constexpr int kQualityVersion = 22;
 
 struct QualityOptions {
   int views = 4;
@@ -55,12 +55,7 @@ struct QualityOptions {
 ///   are not smaller than 0.7 pixels (1 where samplers read level 0 alone) and triangles cover 16 pixels on
 ///   average. Scales that pass there are
 ///   rendered at larger heights as well. Sizes beyond follow from the two largest rendered ones
-///   (table_fit.h: enlarge()). With more views than the default all heights are rendered.
-/// - One row: where that height is a quarter of largest_px, a model of few texels and triangles is rendered
-/// in
-///   one view at 0.71 of it alone, and rungs of mips at a quarter. All else follows by few_table.cpp. Switch
-///   sizes are the largest heights, half octaves included, at which no view is expected to fail. Not where a
-///   sampler reads level 0 alone.
+///   (table_fit.h: enlarge()).
 /// - Switch sizes: a scale passes a height when in every view the mean of FLIP is at most flip_mean and its
 ///   95th percentile at most flip_p95. The switch size is the largest height such that the scale passes it
 ///   and all lower ones that are looked at; 0 = it passes nowhere. FLIP publishes no thresholds: these are

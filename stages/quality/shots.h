@@ -77,7 +77,6 @@ struct Studio {
   std::vector<ShownRows> rows;  // by view
   double pixels_of_unit = 0;    // that views show on average at a displayed height of 1 px
   bool few = false;             // texels and triangles, so that fewer pictures tell as much
-  bool one_row = false;         // so few that textures are shown at one height, in one view
   RenderEnvironment environment;
   std::vector<RenderScene> scenes;      // per kept scale, S_0 first
   std::vector<RenderTexture> textures;  // the source's, then coded ones for the time that they are needed

@@ -120,14 +120,10 @@ class SizeShots {
   /// Textures of the knot, made when they are first asked for.
   Replaced coded(const GroupCells& group, std::size_t knot) {
     Replaced out(source_, -1);
-    for (std::size_t t = 0; t < source_; ++t) {
-      const ShownTexture& shown = sampler_.shown.textures[t];
-      const std::uint32_t level = studio_.textures[t].first_level;
-      if (is_best(sampler_.data, shown, group.knots[knot]))
-        out[t] = uncoded({t, level, true});
-      else if (TextureMaker texture = texture_at(sampler_.data, shown, group.knots[knot], level))
+    for (std::size_t t = 0; t < source_; ++t)
+      if (TextureMaker texture = texture_at(sampler_.data, sampler_.shown.textures[t], group.knots[knot],
+                                            studio_.textures[t].first_level))
         out[t] = add(std::move(texture));
-    }
     return out;
   }
 
@@ -324,23 +320,18 @@ double interpolated(const std::vector<std::optional<double>>& values, std::size_
   return (1 - part) * *values[below] + part * *values[above];
 }
 
-ViewPart coded_views(std::size_t rank, const Studio& studio) {
-  if (rank > 0 || studio.one_row) return ViewPart::kLargest;
-  return studio.few ? ViewPart::kLarge : ViewPart::kAll;
+ViewPart coded_views(std::size_t rank, bool few) {
+  return rank > 0 ? ViewPart::kLargest : few ? ViewPart::kLarge : ViewPart::kAll;
 }
 /// Of what is compared with coded planes.
-ViewPart other_views(std::size_t rank, const Studio& studio) {
-  return rank == 0 && !studio.one_row ? ViewPart::kLarge : ViewPart::kLargest;
-}
+ViewPart other_views(std::size_t rank) { return rank == 0 ? ViewPart::kLarge : ViewPart::kLargest; }
 
 /// A group's textures in each way of Together.
 using TogetherTextures = std::array<Replaced, 3>;
 
 TogetherTextures add_group(const TextureSampler& sampler, std::size_t rank, const Display& display,
-                           const PlanesOfGroup& planes, const Studio& studio, GroupCells& group,
-                           SizeShots& shots) {
-  const bool follows = studio.few && follows_below(sampler, rank);
-  const ViewPart views = coded_views(rank, studio);
+                           const PlanesOfGroup& planes, bool few, GroupCells& group, SizeShots& shots) {
+  const bool follows = few && follows_below(sampler, rank);
   group.knots = sample_knots(sampler.data, planes, sampler.rung_samples, display);
   group.texel_level = texel_level(sampler.data, planes, display);
   const std::size_t knots = group.knots.size();
@@ -352,17 +343,17 @@ TogetherTextures add_group(const TextureSampler& sampler, std::size_t rank, cons
   for (std::size_t k = 0; k < knots; ++k) {
     if (!is_sampled(sampler, group.knots, k, rank)) continue;
     coded = shots.coded(group, k);
-    shots.take(0, coded, group.coded[k], views);
+    shots.take(0, coded, group.coded[k], coded_views(rank, few));
   }
   group.preview.resize(1);
   const Replaced preview = shots.previews(planes);
-  if (!follows) shots.take(0, preview, group.preview[0], views);
+  if (!follows) shots.take(0, preview, group.preview[0], coded_views(rank, few));
   MipSamples mips = mip_samples(sampler, rank, display, planes);
   if (follows) mips.finer = 0;
   for (std::size_t l = 0; l < mips.finer; ++l)
-    shots.take(0, shots.mips(group, -static_cast<int>(l)), group.finer[l], views);
+    shots.take(0, shots.mips(group, -static_cast<int>(l)), group.finer[l], coded_views(rank, few));
   for (std::size_t l = 0; l < mips.coarser; ++l)
-    shots.take(0, shots.mips(group, static_cast<int>(l) + 1), group.coarser[l], other_views(rank, studio));
+    shots.take(0, shots.mips(group, static_cast<int>(l) + 1), group.coarser[l], other_views(rank));
   const bool coarsest = mips.coarser == kCoarserLevels;
   return {coded, coarsest ? shots.mips(group, static_cast<int>(kCoarserLevels)) : shots.none(), preview};
 }
@@ -373,7 +364,8 @@ void add_textures(const TextureSampler& sampler, std::size_t rank, const Studio&
   cells.groups.resize(sampler.groups.size());
   std::vector<TogetherTextures> textures;
   for (std::size_t g = 0; g < cells.groups.size(); ++g)
-    textures.push_back(add_group(sampler, rank, display, sampler.groups[g], studio, cells.groups[g], shots));
+    textures.push_back(
+        add_group(sampler, rank, display, sampler.groups[g], studio.few, cells.groups[g], shots));
   if (studio.few) return;  // the exponent is a fitted one
   const std::vector<TogetherSample> samples = together_samples(studio.scenes.size(), rank);
   cells.together.resize(samples.size());  // shots hold places in it
@@ -384,7 +376,7 @@ void add_textures(const TextureSampler& sampler, std::size_t rank, const Studio&
     Replaced all = shots.none();
     for (const TogetherTextures& of : textures)
       all = both(std::move(all), of[static_cast<std::size_t>(cell.shown)]);
-    shots.take(cell.scale, all, cell.losses, other_views(rank, studio));
+    shots.take(cell.scale, all, cell.losses, other_views(rank));
   }
 }
 
@@ -615,7 +607,7 @@ void render_size(const TextureSampler& sampler, const SizeTask& task, Studio& st
   for (std::size_t k = 1; k < task.scales.size(); ++k)
     if (task.scales[k]) shots.take_scale(k, cells.geometry[k], *task.scales[k], task.ends_beyond);
   if (task.rank && !sampler.groups.empty()) add_textures(sampler, *task.rank, studio, cells, shots);
-  shots.render(cells.displayed_px, !task.ends_beyond);
+  shots.render(cells.displayed_px, task.rank.has_value());
   for (GroupCells& group : cells.groups)
     for (std::size_t k = 1; k < group.knots.size(); ++k)
       if (repeats(group.knots[k], group.knots[k - 1])) group.coded[k] = group.coded[k - 1];

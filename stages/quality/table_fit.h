@@ -13,7 +13,6 @@
 // 3. texture_losses() sorts a group's knots, takes off what its mips lose without coding, and scales the
 //    curve until its mean over fragments is what whole planes lost: three steps, which bring it near enough.
 // 4. lend_knots() gives each height knots of the others; enlarge() adds heights that are not worth rendering.
-//    Of models of few texels and triangles one row is rendered, and a fitted table has the rest.
 // All loops run over knots, heights and fixed numbers of steps, so the fit ends, and equal pictures give
 // equal tables.
 //
@@ -159,25 +158,6 @@ void lend_knots(const std::vector<double>& texel_level, std::vector<TextureLosse
 /// before, those of coarser mips by kMipGrowth at texels of one pixel, and less at larger ones; what coding
 /// adds, by GroupCurve::kLossPerDoubling.
 void enlarge(const std::vector<double>& texel_level, QualityTable& table);
-
-/// Of models of few texels and triangles: how losses add up (2.0 to 2.5), and the error of what is predicted
-/// for plans.
-inline constexpr float kFewExponent = 2.15f, kFewError = 0.1f;
-
-/// What is rendered of a model of so few texels and triangles that one height tells of all (few_table.cpp).
-struct OneRow {
-  SizeCells
-      row;  // scales and textures, in one view at 0.71 of the table's height; texel_level is of that height
-  SizeCells small;  // textures at a quarter: rungs of mips, which the row does not show
-};
-OneRow render_row(const TextureSampler& sampler, double table_px, Studio& studio, const RunContext& context);
-/// Of an empty table: three sizes, table_px as the last. Those below it are what enlarge() begins with.
-void fill_from_row(const OneRow& rendered, double table_px, const std::vector<PlanesOfGroup>& groups,
-                   QualityTable& table);
-/// Per scale the largest height, half octaves included, at which no view is expected to be beyond `limits`;
-/// 0 = none.
-std::vector<float> one_row_switch_px(const OneRow& rendered, const ShotLimits& limits,
-                                     const QualityOptions& options);
 
 /// What the table's parts say of a sample, and what was measured.
 struct TogetherLoss {

@@ -423,14 +423,6 @@ TextureMaker texture_at(const TextureData& data, const ShownTexture& shown, cons
   };
 }
 
-bool is_best(const TextureData& data, const ShownTexture& shown, const Knot& knot) {
-  const auto best = [&](std::uint32_t plane) {
-    const std::optional<PlaneRung> rung = rung_of(data, knot, plane);
-    return rung && rung->plane == plane && rung->rung + 1 == data.ladder.planes[plane].rungs.size();
-  };
-  return shows_source(data, shown, 0) && best(shown.plane) && (!shown.alpha || best(*shown.alpha));
-}
-
 std::optional<RenderTexture> preview_at(const TextureData& data, const ShownTexture& shown,
                                         const PlanesOfGroup& group, const RunContext& context) {
   if (std::ranges::find(group.planes, shown.plane) == group.planes.end()) return std::nullopt;

@@ -137,8 +137,6 @@ using TextureMaker = std::function<RenderTexture(const RunContext&)>;
 /// outlive the maker.
 TextureMaker texture_at(const TextureData& data, const ShownTexture& shown, const Knot& knot,
                         std::uint32_t source_first_level);
-/// Whether that is best_texture() of full size, which has the source's own texels.
-bool is_best(const TextureData& data, const ShownTexture& shown, const Knot& knot);
 /// The same with the previews of the group's planes.
 std::optional<RenderTexture> preview_at(const TextureData& data, const ShownTexture& shown,
                                         const PlanesOfGroup& group, const RunContext& context);
