@@ -317,12 +317,4 @@ std::string atlas_text(const AtlasDiagnosis& d) {
   return out;
 }
 
-DocumentSchema doctor_schema() {
-  return document_schema(
-      "doctor.v1", "texmesh atlas figures, version 1",
-      "Output of `texmesh doctor INPUT --json`. `texmesh dump PKG atlas --json` has the same "
-      "under \"atlas\", without input, good and reasons.",
-      schema_of<DoctorReport>());
-}
-
 }  // namespace texmesh

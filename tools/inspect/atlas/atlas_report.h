@@ -2,7 +2,6 @@
 
 #include "delivery/cpp/package/package_reader.h"
 #include "pipeline/import/import.h"
-#include "pipeline/io/record.h"
 #include "stages/measure/atlas/atlas_figures.h"
 #include "tools/inspect/notes_count.h"
 
@@ -151,6 +150,5 @@ struct DoctorReport {
     v("notes", s.notes, "where a package has notes at points");
   }
 };
-DocumentSchema doctor_schema();
 
 }  // namespace texmesh
