@@ -35,6 +35,15 @@ struct Check {
   std::string name, rule;
 };
 
+/// What a finding tells: a text or a number.
+struct Told {
+  Told(const char* words) : text(words) {}
+  Told(std::string words) : text(std::move(words)) {}
+  template <class T>
+  requires std::is_arithmetic_v<T> Told(T number) : text(std::to_string(number)) {}
+  std::string text;
+};
+
 /// Collects findings; every method returns whether the rule holds, so that a check can stop where going
 /// on is pointless.
 class Findings {
@@ -58,20 +67,13 @@ class Findings {
     for (Finding& f : other.list_) list_.push_back(std::move(f));
   }
   bool require(bool holds, const Check& check, const std::string& entry, const std::string& field,
-               const std::string& expected, const std::string& found) {
-    if (!holds) add(check, entry, field, expected, found);
+               const Told& expected, const Told& found) {
+    if (!holds) add(check, entry, field, expected.text, found.text);
     return holds;
   }
-  template <class T>
-  bool require_equal(const T& expected, const T& found, const Check& check, const std::string& entry,
+  bool require_equal(const auto& expected, const auto& found, const Check& check, const std::string& entry,
                      const std::string& field) {
-    if (expected == found) return true;
-    if constexpr (std::is_same_v<T, std::string>) {
-      add(check, entry, field, expected, found);
-    } else {
-      add(check, entry, field, std::to_string(expected), std::to_string(found));
-    }
-    return false;
+    return expected == found || require(false, check, entry, field, expected, found);
   }
   bool empty() const { return list_.empty(); }
   const std::vector<Finding>& list() const { return list_; }

@@ -20,7 +20,6 @@
 #include "stages/condition/condition.h"
 #include "stages/image/png_writer.h"
 #include "tools/cli/options/delivery_options.h"
-#include "tools/cli/options/delivery_text.h"
 #include "tools/render/rendered_model.h"
 
 namespace texmesh {

@@ -1,16 +1,12 @@
 #include "pipeline/about/source_annotations.h"
 
-#include <charconv>
-#include <map>
 #include <nlohmann/json.hpp>
-#include <set>
 
 #include "format/base/bounded_json.h"
 #include "format/base/portable_math.h"
 #include "format/base/text_bytes.h"
 #include "pipeline/about/source_fields.h"
 #include "pipeline/io/file_resolver.h"
-#include "pipeline/io/record.h"
 
 namespace texmesh {
 namespace {

@@ -10,7 +10,7 @@
 #include "pipeline/about/source_annotations.h"
 #include "pipeline/compile/stage_table.h"
 #include "pipeline/graph/memory_store.h"
-#include "pipeline/import/archive/archive_about.h"
+#include "pipeline/import/archive/archive_files.h"
 #include "pipeline/io/atomic_file.h"
 #include "pipeline/io/file_resolver.h"
 #include "pipeline/io/machine.h"

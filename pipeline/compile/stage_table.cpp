@@ -1,6 +1,6 @@
 #include "pipeline/compile/stage_table.h"
 
-#include "pipeline/import/placed_annotations.h"
+#include "pipeline/import/up_axis.h"
 #include "pipeline/io/program.h"
 #include "stages/fill/fill.h"
 #include "stages/geometry/mesh_topology.h"

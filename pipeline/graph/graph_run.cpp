@@ -10,7 +10,6 @@
 #include <malloc.h>
 #endif
 
-#include <algorithm>
 #include <chrono>
 #include <condition_variable>
 #include <exception>

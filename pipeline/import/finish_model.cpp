@@ -1,12 +1,9 @@
 #include "pipeline/import/mesh_builder.h"
 
-#include <bit>
-#include <limits>
 #include <numeric>
 
 #include "pipeline/import/up_axis.h"
 #include "pipeline/io/table.h"
-#include "stages/base/first_use_table.h"
 
 namespace texmesh {
 namespace {

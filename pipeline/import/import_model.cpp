@@ -2,10 +2,9 @@
 
 #include "format/base/bounded_json.h"
 #include "format/base/text_bytes.h"
-#include "pipeline/import/archive/archive_about.h"
-#include "pipeline/import/foreign_file.h"
+#include "pipeline/import/archive/archive_files.h"
 #include "pipeline/import/gltf/import_gltf_parts.h"
-#include "pipeline/import/mesh_builder.h"
+#include "pipeline/import/named_files.h"
 #include "pipeline/import/text_scan.h"
 #include "pipeline/import/up_axis.h"
 
@@ -159,8 +158,6 @@ ImportedModel import_model(const std::string& file_name, std::span<const std::ui
 
 namespace {
 
-using Json = nlohmann::json;
-
 /// Draco gets below a byte a triangle.
 constexpr std::uint64_t kMostPerByte = 8;
 
@@ -170,12 +167,12 @@ std::uint32_t word(std::span<const std::uint8_t> bytes, std::size_t at) {
   return value;
 }
 
-std::uint64_t number(const Json& object, const char* key, std::uint64_t otherwise) {
+std::uint64_t number(const nlohmann::json& object, const char* key, std::uint64_t otherwise) {
   const auto found = object.find(key);
   return found != object.end() && found->is_number_unsigned() ? found->get<std::uint64_t>() : otherwise;
 }
 
-std::uint64_t triangles_of_primitive(const Json& primitive, const Json& accessors) {
+std::uint64_t triangles_of_primitive(const nlohmann::json& primitive, const nlohmann::json& accessors) {
   constexpr std::uint64_t kTriangles = 4, kNone = ~std::uint64_t{0};
   if (!primitive.is_object() || number(primitive, "mode", kTriangles) != kTriangles) return 0;
   std::uint64_t accessor = number(primitive, "indices", kNone);
@@ -191,14 +188,14 @@ std::uint64_t triangles_of_glb(std::span<const std::uint8_t> bytes) {
   const auto* text = reinterpret_cast<const char*>(bytes.data()) + 20;
   const JsonShape shape = scan_json_shape(bytes.subspan(20, word(bytes, 12)), kMaxGltfJsonDepth);
   if (shape.too_deep || shape.values > kMaxGltfJsonValues) return 0;
-  const Json root = Json::parse(text, text + word(bytes, 12), nullptr, false);
+  const nlohmann::json root = nlohmann::json::parse(text, text + word(bytes, 12), nullptr, false);
   if (!root.is_object() || !root.contains("meshes") || !root.contains("accessors") ||
       !root["meshes"].is_array() || !root["accessors"].is_array())
     return 0;
   std::uint64_t sum = 0;
-  for (const Json& mesh : root["meshes"])
+  for (const nlohmann::json& mesh : root["meshes"])
     if (mesh.is_object() && mesh.contains("primitives") && mesh["primitives"].is_array())
-      for (const Json& primitive : mesh["primitives"])
+      for (const nlohmann::json& primitive : mesh["primitives"])
         sum += triangles_of_primitive(primitive, root["accessors"]);
   return sum;
 }

@@ -1,4 +1,3 @@
-
 #include "pipeline/import/mesh_builder.h"
 #include "pipeline/import/text_scan.h"
 

@@ -1,7 +1,6 @@
 #include "pipeline/import/mesh_builder.h"
 
 #include "format/base/portable_math.h"
-#include "format/base/vec.h"
 #include "stages/geometry/mesh_topology.h"
 
 namespace texmesh {

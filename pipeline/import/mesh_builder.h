@@ -1,11 +1,5 @@
 #pragma once
-#include <array>
-#include <cstdint>
-#include <span>
-#include <string>
-#include <vector>
 
-#include "format/model/model.h"
 #include "pipeline/import/import.h"
 #include "stages/base/first_use_table.h"
 

@@ -1,6 +1,6 @@
 #pragma once
 #include <cstdint>
-#include <optional>
+#include <span>
 #include <string>
 
 #include "format/base/note.h"
@@ -39,5 +39,9 @@ NamedFile find_file(const NameInModel& name, Resolver& resolver, std::uint64_t m
 /// How the file of a finer scale names a picture of its package: "../preview/PPP.jpg". The one name that
 /// leaves the model's folder: resolvers of packages know it, FileResolver refuses it as any other.
 bool is_preview_uri(const std::string& uri);
+
+/// What a file is by its first bytes, where it is neither a model nor a picture that texmesh reads, and what
+/// to do about it: "a Git LFS pointer (git lfs pull fetches the file)". "" for anything else.
+std::string foreign_file(std::span<const std::uint8_t> bytes);
 
 }  // namespace texmesh

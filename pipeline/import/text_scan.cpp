@@ -1,8 +1,6 @@
 #include "pipeline/import/text_scan.h"
 
 #include <algorithm>
-#include <charconv>
-#include <cstring>
 #include <limits>
 
 #include "pipeline/io/uri.h"

@@ -1,4 +1,5 @@
 #pragma once
+#include "format/documents/annotations.h"
 #include "pipeline/import/import.h"
 
 namespace texmesh {
@@ -26,5 +27,11 @@ Vec3<T> turned_up(Vec3<T> v, char up) {
 /// The axis of the source that became y: by the user's word, else as import_model() has told it in
 /// About::source. 'y' where nothing was turned.
 char turned_axis(const About& about, UpAxis up);
+
+/// Notes as PackageOptions::annotations has them, as a package has them: turned as the mesh of `source` was,
+/// and moved from the source's coordinates to those of meshes at `origin`, unless they are there already.
+/// Those outside `box`, the bounds of the meshes, cost a warning. "" stays "".
+std::string placed_annotations(const std::string& json, const About& source, UpAxis up, Vec3d origin,
+                               const Box3d& box, Notes& notes);
 
 }  // namespace texmesh

@@ -5,7 +5,6 @@
 #include <sys/syscall.h>
 
 #include "pipeline/io/names/similar_names.h"
-#include "pipeline/io/uri.h"
 
 namespace texmesh {
 namespace {

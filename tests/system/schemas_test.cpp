@@ -15,7 +15,7 @@
 #include "pipeline/about/source_fields.h"
 #include "pipeline/batch/plan.h"
 #include "pipeline/compile/options.h"
-#include "pipeline/import/range/range_scan_document.h"
+#include "pipeline/import/range/import_range.h"
 #include "tests/support/schema.h"
 #include "tools/inspect/package_tree.h"
 #include "tools/inspect/provenance.h"

@@ -1,26 +1,19 @@
 // The commands that make packages: compile, and what serves it. cache; of large collections on many machines
 // the list of models, and one summary of many runs.
-#include <unistd.h>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
-#include <optional>
 
 #include "format/base/text_bytes.h"
-#include "format/documents/about.h"
 #include "pipeline/about/source_annotations.h"
 #include "pipeline/about/source_fields.h"
 #include "pipeline/batch/fleet/model_list.h"
-#include "pipeline/batch/plan.h"
 #include "pipeline/batch/run.h"
 #include "pipeline/cache/cache_layer.h"
-#include "pipeline/cache/disk_store.h"
-#include "pipeline/compile/options.h"
 #include "pipeline/compile/stage_table.h"
 #include "pipeline/io/atomic_file.h"
 #include "pipeline/io/file_resolver.h"
 #include "pipeline/io/machine.h"
-#include "pipeline/io/resolver.h"
 #include "pipeline/io/table.h"
 #include "tools/cli/commands.h"
 #include "tools/cli/options/command_line.h"

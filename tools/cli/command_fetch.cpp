@@ -8,15 +8,10 @@
 
 #include "delivery/cpp/client/texture_loader.h"
 #include "delivery/cpp/package/http_store.h"
-#include "delivery/cpp/transfer/transfer.h"
-#include "format/base/bytes.h"
-#include "format/container/layout.h"
-#include "format/rules/proxy_choice.h"
 #include "pipeline/io/atomic_file.h"
 #include "pipeline/io/table.h"
 #include "tools/cli/commands.h"
 #include "tools/cli/options/delivery_options.h"
-#include "tools/cli/options/delivery_text.h"
 #include "tools/extract/glb/standalone_glb.h"
 
 namespace texmesh {

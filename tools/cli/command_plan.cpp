@@ -6,7 +6,6 @@
 #include "tools/cli/commands.h"
 #include "tools/cli/options/common_options.h"
 #include "tools/cli/options/delivery_options.h"
-#include "tools/cli/options/delivery_text.h"
 
 namespace texmesh {
 namespace {

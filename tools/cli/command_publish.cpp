@@ -2,17 +2,13 @@
 // at once.
 #include <pthread.h>
 #include <signal.h>
-#include <unistd.h>
-#include <thread>
 
 #include "pipeline/io/atomic_file.h"
 #include "pipeline/io/file_resolver.h"
 #include "pipeline/io/table.h"
-#include "pipeline/io/uri.h"
 #include "tools/cli/commands.h"
 #include "tools/cli/options/command_line.h"
 #include "tools/cli/options/common_options.h"
-#include "tools/extract/extract.h"
 #include "tools/extract/usdz/usdz.h"
 #include "tools/publish/export/export.h"
 #include "tools/publish/report/report.h"

@@ -1,8 +1,10 @@
 #pragma once
+#include <vector>
 
 namespace texmesh {
 
 class Command;
+struct DocumentSchema;
 
 /// The one list of commands, in the help's order: COMMAND(group of the help, name), and RARE(group, name) of
 /// those that only `texmesh --help-all` lists. add_NAME_command() adds the command to the program. The
@@ -36,5 +38,8 @@ class Command;
 #define TEXMESH_DECLARE(group, name) void add_##name##_command(Command& program);
 TEXMESH_COMMANDS(TEXMESH_DECLARE, TEXMESH_DECLARE)
 #undef TEXMESH_DECLARE
+
+/// Of what commands print with --json, by name.
+std::vector<DocumentSchema> command_schemas();
 
 }  // namespace texmesh

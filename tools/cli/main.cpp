@@ -1,7 +1,6 @@
 // texmesh: every command, and the workers that compile starts (pipeline/compile/workers/worker_child.cpp).
 #include "format/container/layout.h"
 #include "pipeline/compile/options.h"
-#include "pipeline/compile/workers/sandbox.h"
 #include "pipeline/compile/workers/worker.h"
 #include "pipeline/io/program.h"
 #include "tools/cli/commands.h"

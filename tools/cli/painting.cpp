@@ -6,7 +6,6 @@
 
 #include "format/base/text_bytes.h"
 #include "pipeline/cache/disk_store.h"
-#include "pipeline/compile/options.h"
 #include "pipeline/io/atomic_file.h"
 #include "pipeline/io/file_resolver.h"
 #include "pipeline/io/table.h"

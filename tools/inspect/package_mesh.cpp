@@ -1,6 +1,5 @@
 #include "tools/inspect/package_mesh.h"
 
-#include <algorithm>
 #include <filesystem>
 #include <fstream>
 

@@ -2,10 +2,8 @@
 
 #include <zlib.h>
 
-#include <algorithm>
 #include <nlohmann/json.hpp>
 
-#include "delivery/cpp/package/package_reader.h"
 #include "format/base/bounded_json.h"
 #include "format/rules/allocation.h"
 #include "pipeline/io/atomic_file.h"
@@ -46,14 +44,13 @@ void check_rung_files(PackageStore& folder, const std::map<std::string, std::uin
     const std::string path = fragment_file_path(plane, rung, fragment, codec_traits(info.codec).extension);
     if (streams.stream(fragment).empty()) {
       findings.require(stated.bytes[k] == 0, "fragment-file", kFragmentIndexPath, path,
-                       "0 bytes, as the rung does not store it", std::to_string(stated.bytes[k]));
+                       "0 bytes, as the rung does not store it", stated.bytes[k]);
       continue;
     }
     const Bytes whole = streams.file(fragment);
     const auto file = files.find(path);
     if (!findings.require(file != files.end(), "fragment-file", path, "", "a file", "none")) continue;
-    if (!findings.require_equal<std::uint64_t>(whole.size(), file->second, "fragment-file", path, "bytes"))
-      continue;
+    if (!findings.require_equal(whole.size(), file->second, "fragment-file", path, "bytes")) continue;
     EntryRef ref;
     ref.path = path;
     ref.bytes = whole.size();

@@ -1,6 +1,5 @@
 #include "tools/render/rendered_model.h"
 
-#include "delivery/cpp/package/package_reader.h"
 #include "pipeline/import/named_files.h"
 #include "pipeline/io/file_resolver.h"
 #include "stages/base/parallel.h"

@@ -1,8 +1,6 @@
 #pragma once
 
 #include "delivery/cpp/package/package_reader.h"
-#include "format/base/vec.h"
-#include "format/model/model.h"
 #include "pipeline/import/import.h"
 #include "stages/render/environment.h"
 #include "stages/render/render_texture.h"

@@ -7,12 +7,12 @@
 
 #include "format/base/bounded_json.h"
 #include "format/base/text_bytes.h"
+#include "pipeline/import/import_images.h"
 #include "pipeline/import/named_files.h"
 #include "pipeline/import/obj/obj_material.h"
 #include "pipeline/import/ply/ply_reader.h"
-#include "pipeline/import/range/range_scan_document.h"
+#include "pipeline/import/range/import_range.h"
 #include "pipeline/import/text_scan.h"
-#include "pipeline/import/udim.h"
 #include "pipeline/io/file_resolver.h"
 #include "pipeline/io/uri.h"
 

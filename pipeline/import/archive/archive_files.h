@@ -1,7 +1,8 @@
 #pragma once
-#include <memory>
 
+#include "format/base/note.h"
 #include "format/container/container.h"
+#include "format/documents/about.h"
 #include "pipeline/io/resolver.h"
 
 namespace texmesh {
@@ -55,5 +56,14 @@ class ArchiveFiles : public Resolver {
   std::unique_ptr<ByteSource> source_;
   std::vector<ArchivedFile> files_;
 };
+
+/// What an archive says of its model beside it: Sketchfab's license.txt (title, author, source, licence,
+/// credit), and of OpenDroneMap's textured models metres, z as up axis, and the coordinate reference that
+/// coords.txt or proj.txt names. `model`: the model's name in the archive.
+About archive_about(ArchiveFiles& archive, const std::string& model, Notes& notes);
+
+/// The archive's file of notes, by name and bytes: annotations.json, else Voyager's NAME.svx.json, the least
+/// deep. Nothing where it has none. InputError where it cannot be unpacked.
+std::optional<std::pair<std::string, Bytes>> archived_annotations(ArchiveFiles& archive);
 
 }  // namespace texmesh

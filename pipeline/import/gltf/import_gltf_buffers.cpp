@@ -3,11 +3,9 @@
 
 #include <nlohmann/json.hpp>
 
-#include "pipeline/import/foreign_file.h"
 #include "pipeline/import/gltf/import_gltf_parts.h"
 #include "pipeline/import/named_files.h"
 #include "pipeline/import/text_scan.h"
-#include "pipeline/io/uri.h"
 
 namespace texmesh {
 namespace {

@@ -4,11 +4,9 @@
 
 #include "format/model/material_extensions.h"
 #include "pipeline/import/gltf/import_gltf_parts.h"
+#include "pipeline/import/import_images.h"
 #include "pipeline/import/material_images.h"
-#include "pipeline/import/seen_texels.h"
 #include "pipeline/import/text_scan.h"
-#include "pipeline/import/udim.h"
-#include "pipeline/io/uri.h"
 
 namespace texmesh {
 namespace {

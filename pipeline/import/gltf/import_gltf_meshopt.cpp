@@ -1,7 +1,5 @@
 #include <meshoptimizer.h>
 
-#include <limits>
-
 #include "pipeline/import/gltf/import_gltf_parts.h"
 
 namespace texmesh {

@@ -1,15 +1,6 @@
 #pragma once
-#include <cstdint>
-#include <functional>
 #include <nlohmann/json_fwd.hpp>
-#include <optional>
-#include <span>
-#include <string>
-#include <string_view>
-#include <vector>
 
-#include "format/base/bytes.h"
-#include "pipeline/import/import.h"
 #include "pipeline/import/mesh_builder.h"
 
 namespace tinygltf {

@@ -3,7 +3,6 @@
 #include <draco/compression/decode.h>
 #include <tiny_gltf.h>
 
-#include <limits>
 #include <memory>
 #include <new>
 #include <nlohmann/json.hpp>

@@ -5,7 +5,6 @@
 // tinygltf 2.7: another version that has them not, or others, does not compile.
 // nlohmann's header comes first: tinygltf would include it with hidden visibility.
 #include <fstream>
-#include <limits>
 #include <nlohmann/json.hpp>
 
 #define TINYGLTF_IMPLEMENTATION

@@ -1,14 +1,10 @@
-#include <charconv>
-#include <limits>
-
 #include "pipeline/about/source_fields.h"
-#include "pipeline/import/foreign_file.h"
+#include "pipeline/import/import_images.h"
+#include "pipeline/import/material_images.h"
 #include "pipeline/import/mesh_builder.h"
 #include "pipeline/import/named_files.h"
 #include "pipeline/import/obj/obj_material.h"
-#include "pipeline/import/seen_texels.h"
 #include "pipeline/import/text_scan.h"
-#include "pipeline/import/udim.h"
 
 // OBJ is read here and not by tinyobjloader 2.0rc10, which (measured on Debian 12) turns "nan", "inf" and
 // words into 0 without a word, wraps the index 99999999999 onto another vertex, gives a polygon of 300

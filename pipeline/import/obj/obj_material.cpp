@@ -1,12 +1,9 @@
 #include "pipeline/import/obj/obj_material.h"
 
-#include <set>
-
 #include "pipeline/import/import_images.h"
 #include "pipeline/import/material_images.h"
 #include "pipeline/import/mesh_builder.h"
 #include "pipeline/import/text_scan.h"
-#include "pipeline/import/udim.h"
 
 namespace texmesh {
 namespace {

@@ -1,10 +1,5 @@
 #pragma once
-#include <optional>
-#include <span>
-#include <string>
-#include <vector>
 
-#include "format/model/model.h"
 #include "pipeline/import/import.h"
 
 namespace texmesh {

@@ -1,12 +1,8 @@
-
-#include <span>
-
 #include "pipeline/about/source_fields.h"
+#include "pipeline/import/import_images.h"
+#include "pipeline/import/material_images.h"
 #include "pipeline/import/mesh_builder.h"
-#include "pipeline/import/named_files.h"
 #include "pipeline/import/ply/ply_reader.h"
-#include "pipeline/import/seen_texels.h"
-#include "pipeline/import/udim.h"
 
 // PLY has no specification of names beyond x, y, z. This is what MeshLab, CloudCompare, Metashape, Blender
 // and VTK write, and what is read here:

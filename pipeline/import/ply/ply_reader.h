@@ -1,10 +1,5 @@
 #pragma once
-#include <cstdint>
 #include <initializer_list>
-#include <span>
-#include <string>
-#include <string_view>
-#include <vector>
 
 #include "pipeline/import/text_scan.h"
 

@@ -1,16 +1,61 @@
+#include "pipeline/import/range/import_range.h"
+
+#include <nlohmann/json.hpp>
 
 #include "format/base/portable_math.h"
 #include "format/base/text_bytes.h"
-#include "pipeline/import/foreign_file.h"
 #include "pipeline/import/import_images.h"
+#include "pipeline/import/material_images.h"
 #include "pipeline/import/mesh_builder.h"
-#include "pipeline/import/range/range_scan_document.h"
-#include "pipeline/import/seen_texels.h"
+#include "pipeline/import/named_files.h"
 #include "pipeline/import/text_scan.h"
 #include "stages/image/decode_image.h"
 
 namespace texmesh {
 namespace {
+
+constexpr std::size_t kMaxJsonBytes = 1 << 20, kMaxGridHeaderBytes = 1 << 16;
+
+// The KEY=VALUE lines of a Cyberware file.
+struct CyberwareHeader {
+  std::map<std::string, std::string> values;
+  std::size_t data_offset = 0;
+};
+
+CyberwareHeader read_cyberware_header(const std::string& file, std::span<const std::uint8_t> bytes) {
+  CyberwareHeader header;
+  const std::string_view text = text_of(bytes).substr(0, kMaxGridHeaderBytes);
+  std::size_t at = 0, line = 0;
+  for (;;) {
+    const std::size_t end = text.find('\n', at);
+    if (end == std::string_view::npos)
+      throw InputError(file, "line " + std::to_string(line + 1), "DATA=", "the end of the header");
+    const std::string_view words = trim(text.substr(at, end - at));
+    at = end + 1;
+    ++line;
+    if (line == 1) {
+      if (words != "Cyberware Digitizer Data")
+        throw InputError(file, "line 1", "\"Cyberware Digitizer Data\"", quote(words));
+      continue;
+    }
+    if (words == "DATA=") break;
+    const std::size_t equals = words.find('=');
+    if (equals != std::string_view::npos)
+      header.values.try_emplace(std::string(words.substr(0, equals)), trim(words.substr(equals + 1)));
+  }
+  header.data_offset = at;
+  return header;
+}
+
+std::int64_t integer(const std::string& file, const CyberwareHeader& header, const char* key, std::int64_t lo,
+                     std::int64_t hi) {
+  const auto it = header.values.find(key);
+  std::int64_t value = 0;
+  if (it == header.values.end() || !parse_integer(it->second, value) || value < lo || value > hi)
+    throw InputError(file, key, "a whole number from " + std::to_string(lo) + " to " + std::to_string(hi),
+                     it == header.values.end() ? "none" : quote(it->second));
+  return value;
+}
 
 // ---- the grid's values
 
@@ -109,13 +154,13 @@ RangeScan scan_from_json(const std::string& file, const RangeScanDescription& d,
   const double turn = 2 * portable::kPi, degree = portable::kPi / 180;
   scan.alpha_step_rad = d.alpha_step_deg ? *d.alpha_step_deg * degree : turn / std::max(1u, values.columns);
   scan.alpha_start_rad = d.alpha_start_deg * degree;
-  scan.clockwise = d.clockwise;
+  scan.clockwise = d.direction == ScanDirection::kClockwise;
   scan.y_step = d.y_step;
   scan.y_top = d.y_top.value_or(d.y_step * (std::max(1u, values.rows) - 1));
   scan.max_radius_step = d.max_radius_step.value_or(0);
   scan.radius.resize(values.data.size());
   for (std::size_t i = 0; i < values.data.size(); ++i) {
-    const double x = values.data[i], r = d.radius_scale * x + d.radius_offset;
+    const double x = values.data[i], r = d.radius_scale.value_or(1) * x + d.radius_offset;
     const bool valid = std::isfinite(r) && r > 0 && r < 1e15 && (!d.valid_min || x >= *d.valid_min) &&
                        (!d.valid_max || x <= *d.valid_max);
     scan.radius[i] = valid ? static_cast<float>(r) : 0;
@@ -271,6 +316,55 @@ void add_material(const std::string& file, const std::optional<std::string>& tex
 }
 
 }  // namespace
+
+RangeScanDescription read_range_scan_description(const std::string& file,
+                                                 std::span<const std::uint8_t> json) {
+  const Json document = parse_document(json, kMaxJsonBytes, 16, file);
+  auto d = from_json<RangeScanDescription>(document, file, true);
+  for (const auto& [name, step] : {std::pair("alpha_step_deg", d.alpha_step_deg),
+                                   {"y_step", d.y_step},
+                                   {"radius_scale", d.radius_scale},
+                                   {"max_radius_step", d.max_radius_step}})
+    if (step == 0) throw InputError(file, std::string("/") + name, "a number above 0", "0");
+  return d;
+}
+
+RangeScan read_cyberware(const std::string& file, std::span<const std::uint8_t> bytes,
+                         const ImportOptions& options, Notes& notes) {
+  const CyberwareHeader header = read_cyberware_header(file, bytes);
+  if (const auto space = header.values.find("SPACE");
+      space != header.values.end() && space->second != "CYLINDRICAL")
+    throw InputError(file, "SPACE", "CYLINDRICAL", quote(space->second));
+  RangeScan scan;
+  scan.columns = static_cast<std::uint32_t>(integer(file, header, "NLG", 2, 65535));
+  scan.rows = static_cast<std::uint32_t>(integer(file, header, "NLT", 2, 65535));
+  scan.alpha_step_rad = static_cast<double>(integer(file, header, "LGINCR", 1, 3'000'000)) * 1e-6;
+  scan.y_step = static_cast<double>(integer(file, header, "LTINCR", 1, 1'000'000'000)) * 1e-3;
+  const auto shift = integer(file, header, "RSHIFT", 0, 15);
+  scan.y_top = scan.y_step * (scan.rows - 1);
+  const auto right = header.values.find("THETA_RIGHTHAND");
+  scan.clockwise = right == header.values.end() || !same_word(right->second, "TRUE");
+  if (header.values.count("COLOR"))
+    add_info(notes, "colour-not-read", "COLOR",
+             "the colours of a Cyberware scan stand in another file, which is not read");
+  const std::uint64_t samples = std::uint64_t{scan.columns} * scan.rows;
+  if (samples > static_cast<std::uint64_t>(options.max_vertices))
+    throw InputError(file, "NLG x NLT", "at most " + std::to_string(options.max_vertices),
+                     std::to_string(samples));
+  if (bytes.size() - header.data_offset < samples * 2)
+    throw InputError(file, "DATA", std::to_string(samples * 2) + " bytes",
+                     std::to_string(bytes.size() - header.data_offset));
+  scan.radius.resize(samples);
+  const std::uint8_t* data = bytes.data() + header.data_offset;
+  for (std::uint32_t i = 0; i < scan.columns; ++i)
+    for (std::uint32_t j = 0; j < scan.rows; ++j, data += 2) {
+      const auto value = static_cast<std::int16_t>(data[0] << 8 | data[1]);
+      // Latitude 0 is at the bottom.
+      scan.radius[std::size_t{scan.rows - 1 - j} * scan.columns + i] =
+          value > 0 ? static_cast<float>(static_cast<double>(std::int32_t{value} << shift) * 1e-3) : 0.0f;
+    }
+  return scan;
+}
 
 ImportedModel import_range_scan(const std::string& file_name, std::span<const std::uint8_t> bytes,
                                 Resolver& resolver, const ImportOptions& options, const RunContext& context) {

@@ -4,8 +4,8 @@
 
 #include <nlohmann/json.hpp>
 
-#include "pipeline/import/foreign_file.h"
-#include "pipeline/import/udim.h"
+#include "pipeline/import/import_images.h"
+#include "pipeline/import/named_files.h"
 #include "stages/image/decode_image.h"
 #include "tests/pipeline/import/gltf/textured_gltf.h"
 #include "tests/pipeline/import/obj/obj_cases.h"

@@ -6,7 +6,7 @@
 #include "pipeline/batch/fleet/run_summary.h"
 #include "pipeline/io/atomic_file.h"
 #include "pipeline/io/table.h"
-#include "tools/cli/options/delivery_text.h"
+#include "tools/cli/options/delivery_options.h"
 #include "tools/publish/report/report_pictures.h"
 
 namespace texmesh {

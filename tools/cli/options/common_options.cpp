@@ -1,9 +1,6 @@
 #include "tools/cli/options/common_options.h"
 
-#include <unistd.h>
-
 #include <cstdlib>
-#include <filesystem>
 
 #include "pipeline/batch/fleet/run_summary.h"
 #include "pipeline/cache/disk_store.h"
@@ -11,7 +8,6 @@
 #include "pipeline/io/file_resolver.h"
 #include "pipeline/io/machine.h"
 #include "pipeline/io/names/closest_word.h"
-#include "stages/base/run_context.h"
 #include "tools/cli/options/command_line.h"
 
 namespace texmesh {

@@ -1,14 +1,10 @@
 #pragma once
 #include <chrono>
 #include <condition_variable>
-#include <map>
-#include <memory>
 #include <mutex>
 #include <ostream>
-#include <string>
 #include <thread>
 
-#include "format/base/note.h"
 #include "pipeline/batch/plan.h"
 
 namespace texmesh {

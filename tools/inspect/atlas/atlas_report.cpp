@@ -328,12 +328,4 @@ std::string auto_atlas_text(const AtlasDiagnosis& d) {
       grouped(d.charts()));
 }
 
-DocumentSchema doctor_schema() {
-  return document_schema(
-      "doctor.v1", "texmesh atlas figures, version 1",
-      "Output of `texmesh doctor INPUT --json`. `texmesh dump PKG atlas --json` has the same "
-      "under \"atlas\", without input, good and reasons.",
-      schema_of<DoctorReport>());
-}
-
 }  // namespace texmesh

@@ -2,7 +2,6 @@
 
 #include "delivery/cpp/package/package_reader.h"
 #include "pipeline/import/import.h"
-#include "pipeline/io/record.h"
 #include "stages/measure/atlas/atlas_figures.h"
 #include "tools/inspect/notes_count.h"
 
@@ -156,6 +155,5 @@ struct DoctorReport {
     v("auto_atlas", s.auto_atlas, "what compile --atlas auto does with a model, and why");
   }
 };
-DocumentSchema doctor_schema();
 
 }  // namespace texmesh

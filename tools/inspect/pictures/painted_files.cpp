@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include "format/base/portable_math.h"
-#include "format/base/vec.h"
 #include "format/rules/allocation.h"
 #include "stages/gltf/glb_writer.h"
 #include "stages/image/png_writer.h"

@@ -5,7 +5,6 @@
 #include <fmt/format.h>
 
 #include "format/base/portable_math.h"
-#include "format/base/vec.h"
 #include "format/rules/allocation.h"
 #include "pipeline/compile/stage_table.h"
 #include "pipeline/io/table.h"

@@ -2,7 +2,6 @@
 
 #include "delivery/cpp/package/package_reader.h"
 #include "pipeline/compile/compile_model.h"
-#include "pipeline/graph/stage.h"
 #include "stages/measure/atlas/atlas_figures.h"
 
 namespace texmesh {

@@ -9,7 +9,6 @@
 #include <tuple>
 
 #include "format/base/json_fields.h"
-#include "format/documents/index.h"
 #include "format/rules/allocation.h"
 #include "pipeline/io/table.h"
 #include "stages/base/parallel.h"
@@ -138,10 +137,8 @@ void check_source_rung(const TextureInfo& texture, std::span<const std::span<con
 /// textures.json and tables.bin against the manifest and each other: counts, grids, rungs, entry sizes.
 void check_textures(const Manifest& m, const std::vector<TextureInfo>& textures, const PackageTables& tables,
                     Findings& findings) {
-  findings.require_equal<std::uint64_t>(m.plane_count, textures.size(), {"textures", "R04"}, kTexturesPath,
-                                        "");
-  findings.require_equal<std::uint64_t>(m.plane_count, tables.planes.size(), {"tables", "R04"}, kTablesPath,
-                                        "planes");
+  findings.require_equal(m.plane_count, textures.size(), {"textures", "R04"}, kTexturesPath, "");
+  findings.require_equal(m.plane_count, tables.planes.size(), {"tables", "R04"}, kTablesPath, "planes");
   std::set<std::tuple<std::uint32_t, bool, std::uint32_t>> seen;
   for (std::size_t k = 0; k < std::min(textures.size(), tables.planes.size()); ++k) {
     const TextureInfo& info = textures[k];
@@ -155,8 +152,8 @@ void check_textures(const Manifest& m, const std::vector<TextureInfo>& textures,
     findings.require(info.columns == t.columns && info.rows == t.rows, {"tables-grid", "R08"}, kTablesPath,
                      plane_field(k, "grid"), std::to_string(info.columns) + " x " + std::to_string(info.rows),
                      std::to_string(t.columns) + " x " + std::to_string(t.rows));
-    findings.require_equal<std::uint64_t>(m.scales.size(), t.scale_count(), {"tables-scales", "R11"},
-                                          kTablesPath, plane_field(k, "scales"));
+    findings.require_equal(m.scales.size(), t.scale_count(), {"tables-scales", "R11"}, kTablesPath,
+                           plane_field(k, "scales"));
     findings.require(std::equal(info.rung_quality.begin(), info.rung_quality.end(), t.rung_quality.begin(),
                                 t.rung_quality.end()) &&
                          info.rungs.size() == info.rung_quality.size(),
@@ -194,7 +191,7 @@ void check_plane_tables(const TextureInfo& texture, std::uint32_t plane, const P
     surface += static_cast<double>(t.surface_fraction[i]);
     findings.require(t.covered_texels[i] <= texels, {"tables", "T11"}, kTablesPath,
                      plane_field(plane, "covered texels of fragment " + std::to_string(i)),
-                     "at most " + std::to_string(texels), std::to_string(t.covered_texels[i]));
+                     "at most " + std::to_string(texels), t.covered_texels[i]);
   }
   findings.require(surface <= 1.001, {"tables", "T11"}, kTablesPath, plane_field(plane, "surface"),
                    "at most the whole surface, 1", shortest(surface, 6));
@@ -303,8 +300,7 @@ class CheckedStore {
     guarded(findings_, "container", "", [&] { listed_ = store_.list(); });
     for (const ContainerEntry& e : listed_) by_path_[e.path] = &e;
     if (store_.is_folder() || listed_.empty()) return;
-    findings_.require_equal(std::string(kManifestPath), listed_.front().path, {"bootstrap", "K11"}, "",
-                            "first entry");
+    findings_.require_equal(kManifestPath, listed_.front().path, {"bootstrap", "K11"}, "", "first entry");
     const std::uint64_t end = listed_.front().offset + listed_.front().bytes;
     findings_.require(end <= kBootstrapBytes, {"bootstrap", "K12"}, kManifestPath, "end",
                       "at most byte " + std::to_string(kBootstrapBytes), "byte " + std::to_string(end));
@@ -358,8 +354,7 @@ class CheckedStore {
     report_.content_credential = true;
     findings_.require(entry.bytes > 0 && entry.bytes <= kMaxContentCredentialBytes,
                       {"content-credential", "O07"}, entry.path, "",
-                      "1 to " + std::to_string(kMaxContentCredentialBytes) + " bytes",
-                      std::to_string(entry.bytes));
+                      "1 to " + std::to_string(kMaxContentCredentialBytes) + " bytes", entry.bytes);
   }
   void check_stored(const std::string& path, const Bytes& bytes, std::uint64_t offset) {
     ++report_.entries;
@@ -371,8 +366,7 @@ class CheckedStore {
                               "CRC-32");
     if (!store_.is_folder() && path != kManifestPath)
       findings_.require_equal(it->second->offset, offset, {"entry-set", "I08"}, path, "offset");
-    findings_.require_equal<std::uint64_t>(it->second->bytes, bytes.size(), {"entry-set", "I08"}, path,
-                                           "bytes");
+    findings_.require_equal(it->second->bytes, bytes.size(), {"entry-set", "I08"}, path, "bytes");
   }
 
   PackageStore& store_;
@@ -688,11 +682,6 @@ class Verifier {
 
 VerifyReport verify_package(PackageStore& store, const RunContext& context) {
   return Verifier(store, context).run();
-}
-
-DocumentSchema verify_schema() {
-  return document_schema("verify.v1", "texmesh verify report, version 1",
-                         "Output of `texmesh verify PKG... --json`.", schema_of<VerifiedPackages>());
 }
 
 }  // namespace texmesh

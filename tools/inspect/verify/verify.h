@@ -2,7 +2,6 @@
 
 #include "delivery/cpp/package/package_reader.h"
 #include "format/base/finding.h"
-#include "pipeline/io/record.h"
 #include "stages/base/run_context.h"
 #include "tools/inspect/notes_count.h"
 
@@ -57,6 +56,5 @@ struct VerifiedPackages {
   std::vector<VerifiedPackage> packages;
   static void fields(auto& s, auto&& v) { v("packages", s.packages, ""); }
 };
-DocumentSchema verify_schema();
 
 }  // namespace texmesh

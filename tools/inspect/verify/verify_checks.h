@@ -2,11 +2,6 @@
 
 #include "delivery/cpp/package/package_reader.h"
 #include "format/base/finding.h"
-#include "format/documents/about.h"
-#include "format/documents/manifest.h"
-#include "format/documents/quality_table.h"
-#include "format/documents/textures.h"
-#include "format/documents/thesis_tables.h"
 #include "stages/base/run_context.h"
 
 namespace texmesh {

@@ -1,8 +1,6 @@
 // The documents of a package against each other (manifest, index, about.json, quality.bin, provenance.json,
 // thesis.bin), and against what the package shows of the surface: GLBs of scales and proxies, vertex splits.
-#include <algorithm>
 #include <nlohmann/json.hpp>
-#include <set>
 #include <tuple>
 
 #include "format/base/json_fields.h"
@@ -108,7 +106,7 @@ void check_perceptual(const Manifest& m, const PerceptualTable& table, Findings&
     if (row == 0) continue;
     const auto p95 = static_cast<double>(table.p95[pair_index(table.scale.size(), 0, row)]);
     findings.require(std::abs(p95 - s.p95) <= 1e-5 * s.p95, {"thesis", "O06"}, kThesisPath, scale + ", p95",
-                     std::to_string(s.p95), std::to_string(p95));
+                     s.p95, p95);
   }
 }
 
@@ -253,11 +251,11 @@ void check_thesis(const Manifest& m, const PackageTables& tables, const ThesisTa
       return;
     const PlaneTables& t = tables.planes[p];
     if (!plane.z.empty())
-      findings.require_equal<std::uint64_t>(t.fragment_count(), plane.z.size(), {"thesis", "R16"},
-                                            kThesisPath, place + "fragments");
+      findings.require_equal(t.fragment_count(), plane.z.size(), {"thesis", "R16"}, kThesisPath,
+                             place + "fragments");
     if (!plane.models.empty())
-      findings.require_equal<std::uint64_t>(t.fragment_count(), plane.models.size(), {"thesis", "R16"},
-                                            kThesisPath, place + "size models");
+      findings.require_equal(t.fragment_count(), plane.models.size(), {"thesis", "R16"}, kThesisPath,
+                             place + "size models");
     if (!plane.quality.empty() && t.scale_count() == m.scales.size())
       check_gamma_table(m, t, plane, place, findings);
   }
@@ -332,8 +330,8 @@ void check_head(const Manifest& m, std::span<const std::uint8_t> bytes, const Sp
                            to_hex(m.stream->head_digest), {"reference", "R02"}, kManifestPath,
                            "/stream/headSha256");
   const SplitBlock& last = head.blocks.back();
-  findings.require_equal<std::uint64_t>(last.offset + last.bytes(), bytes.size(), {"split-stream", "S08"},
-                                        kSplitStreamPath, "end of the last block");
+  findings.require_equal(last.offset + last.bytes(), bytes.size(), {"split-stream", "S08"}, kSplitStreamPath,
+                         "end of the last block");
 }
 
 void check_scale(const ManifestScale& scale, const SplitScale& s, std::span<const std::uint8_t> stream,
@@ -362,10 +360,8 @@ std::vector<Vec3d> check_mesh(const Manifest& m, const ManifestScale& scale,
   GlbFacts facts = check_glb(glb, entry, findings);
   findings.name_rule(before, "G01");
   if (findings.list().size() != before) return {};  // counts of a broken file say nothing
-  findings.require_equal<std::uint64_t>(scale.triangles, facts.triangles, {"mesh-counts", "G02"}, entry,
-                                        "triangles");
-  findings.require_equal<std::uint64_t>(scale.vertices, facts.vertices, {"mesh-counts", "G02"}, entry,
-                                        "vertices");
+  findings.require_equal(scale.triangles, facts.triangles, {"mesh-counts", "G02"}, entry, "triangles");
+  findings.require_equal(scale.vertices, facts.vertices, {"mesh-counts", "G02"}, entry, "vertices");
   check_bounds(m, facts, entry, "G02", findings);
   if (textures) {
     check_image_names(scale, *textures, facts, findings);
@@ -387,7 +383,7 @@ bool check_gltf_scale(const Manifest& m, const std::vector<EntryRef>& index,
   findings.name_rule(before, "G01");
   if (findings.list().size() != before) return false;
   findings.require(facts.triangles <= scale->triangles, {"gltf", "H03"}, entry.path, "triangles",
-                   "at most " + std::to_string(scale->triangles), std::to_string(facts.triangles));
+                   "at most " + std::to_string(scale->triangles), facts.triangles);
   check_bounds(m, facts, entry.path, "G02", findings);
   ManifestScale named = *scale;
   named.glb = entry;
@@ -461,12 +457,10 @@ void check_proxy(const Manifest& m, const ManifestProxy& proxy, std::span<const 
   const GlbFacts facts = check_glb(glb, entry, findings, GlbRules::kStandalone);
   findings.name_rule(before, "G13");
   if (findings.list().size() != before) return;  // counts of a broken file say nothing
-  findings.require_equal<std::uint64_t>(proxy.triangles, facts.triangles, {"mesh-counts", "G14"}, entry,
-                                        "triangles");
-  findings.require_equal<std::uint64_t>(proxy.vertices, facts.vertices, {"mesh-counts", "G14"}, entry,
-                                        "vertices");
-  findings.require_equal<std::uint64_t>(proxy.texture_px, facts.largest_image_px, {"mesh-images", "G14"},
-                                        entry, "longest side of its textures");
+  findings.require_equal(proxy.triangles, facts.triangles, {"mesh-counts", "G14"}, entry, "triangles");
+  findings.require_equal(proxy.vertices, facts.vertices, {"mesh-counts", "G14"}, entry, "vertices");
+  findings.require_equal(proxy.texture_px, facts.largest_image_px, {"mesh-images", "G14"}, entry,
+                         "longest side of its textures");
   findings.require(facts.codec != "draco" || &proxy != &m.proxies.front(), {"mesh-codec", "G15"}, entry, "",
                    "a mesh that needs no Draco", facts.codec);
   check_bounds(m, facts, entry, "G14", findings);
@@ -497,8 +491,7 @@ void check_split_stream(const Manifest& m, std::span<const std::uint8_t> bytes, 
   for (const SplitGroup& g : head.groups)
     findings.require(!share.known || g.material < std::max<std::size_t>(share.material_count, 1),
                      {"split-stream", "S23"}, kSplitStreamPath, "groups",
-                     "a material of the GLBs, of " + std::to_string(share.material_count),
-                     std::to_string(g.material));
+                     "a material of the GLBs, of " + std::to_string(share.material_count), g.material);
   // The manifest's counts bound nothing here: on a coarse grid most faces of a stream may show nothing, and
   // the files have none of them. What the reader makes is bounded by the bytes of the blocks.
   SplitStreamReader reader(head);

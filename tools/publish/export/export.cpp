@@ -2,21 +2,16 @@
 
 #include <fmt/format.h>
 
-#include <nlohmann/json.hpp>
-
 #include "delivery/cpp/decide/texture_loss.h"
 #include "format/base/text_bytes.h"
-#include "format/rules/output_transform.h"
 #include "format/rules/viewing.h"
 #include "pipeline/io/markup.h"
 #include "pipeline/io/table.h"
 #include "pipeline/io/uri.h"
-#include "stages/gltf/check_glb.h"
-#include "tools/extract/extract.h"
 #include "tools/extract/glb/standalone_glb.h"
 #include "tools/extract/usdz/usdz.h"
 #include "tools/publish/pages/page.h"
-#include "tools/publish/view/served_files.h"
+#include "tools/publish/view/view_server.h"
 
 namespace texmesh {
 namespace {
@@ -410,13 +405,6 @@ Export make_export(PackageReader& package, const std::string& path, const Export
 }
 
 std::string export_list(const Export& made) { return document_text(to_json(made)); }
-
-DocumentSchema export_schema() {
-  return document_schema(
-      "export.v1", "texmesh export list, version 1",
-      "Output of `texmesh export PKG --to TARGET -o DIR --json`, and export.json in DIR: what was written.",
-      schema_of<Export>());
-}
 
 FolderRule export_folder_rule() {
   return marked_folder_rule(kListFile, kListBegin, "an empty folder, an earlier export, or nothing yet");

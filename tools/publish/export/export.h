@@ -1,10 +1,6 @@
 #pragma once
 
-#include "delivery/cpp/package/package_reader.h"
-#include "format/base/vec.h"
 #include "pipeline/io/new_folder.h"
-#include "pipeline/io/record.h"
-#include "stages/base/run_context.h"
 #include "tools/extract/extract.h"
 
 namespace texmesh {
@@ -29,7 +25,7 @@ struct ExportOptions {
   std::string provider;                         // oembed; "" = the host of `url`
   std::uint32_t width_px = 640, height_px = 480;  // oembed: of the frame
   std::string script;  // model-viewer: URL of the script; "" = a copy of `viewer`'s
-  std::string viewer;  // folder with the built viewer, or of model-viewer with its script (served_files.h)
+  std::string viewer;  // folder with the built viewer, or of model-viewer with its script (view_server.h)
 };
 
 struct ExportedFile {
@@ -84,7 +80,6 @@ Export make_export(PackageReader& package, const std::string& path, const Export
 
 /// export.json of the folder, which names its files (schemas/export.v1.schema.json).
 std::string export_list(const Export& made);
-DocumentSchema export_schema();
 
 /// Writes the folder, which appears whole or not at all. An earlier export is replaced. InputError when the
 /// folder holds anything else, or cannot be made.

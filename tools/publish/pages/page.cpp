@@ -1,7 +1,6 @@
 #include "tools/publish/pages/page.h"
 
 #include <fmt/format.h>
-#include <algorithm>
 #include <filesystem>
 
 #include "format/base/portable_math.h"

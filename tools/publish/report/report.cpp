@@ -1,6 +1,7 @@
 // The page in the order of its sections: what holds (switch sizes), the source beside S_0, what bytes buy,
 // where the bytes are, fragments, the step function, proxies, method.
 #include "tools/publish/report/report.h"
+#include "pipeline/io/markup.h"
 #include "pipeline/io/table.h"
 
 #include <fmt/format.h>
@@ -8,7 +9,6 @@
 #include <nlohmann/json.hpp>
 
 #include "format/base/portable_math.h"
-#include "pipeline/io/markup.h"
 #include "tools/inspect/dump/dump.h"
 #include "tools/publish/pages/page.h"
 
@@ -548,13 +548,6 @@ Report make_report(PackageReader& package, const ReportOptions& options, const R
   const std::string page = html_page(report.title, body);
   report.files.front().bytes.assign(page.begin(), page.end());
   return report;
-}
-
-DocumentSchema report_schema() {
-  return document_schema(
-      "report.v1", "texmesh report --json, version 1",
-      "What a report says. FLIP is measured by rendering: 0 = equal, 1 = as different as can be.",
-      schema_of<Report>());
 }
 
 FolderRule report_folder_rule() {

@@ -111,8 +111,6 @@ struct Report {
 /// FormatError when the package is damaged, InputError for a model file that cannot be read.
 Report make_report(PackageReader& package, const ReportOptions& options, const RunContext& context);
 
-DocumentSchema report_schema();
-
 /// The page of a folder that html_page() fills.
 inline constexpr const char* kReportPage = "index.html";
 /// A folder is new or empty, or it holds such a page and is replaced.

@@ -2,9 +2,7 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <nlohmann/json.hpp>
-#include <set>
 #include <tuple>
 
 #include "format/base/text_bytes.h"
@@ -17,7 +15,7 @@
 #include "tools/publish/export/export.h"
 #include "tools/publish/pages/page.h"
 #include "tools/publish/site/site_words.h"
-#include "tools/publish/view/served_files.h"
+#include "tools/publish/view/view_server.h"
 
 namespace texmesh {
 namespace {
@@ -508,12 +506,6 @@ Site read_site(const std::string& packages, const SiteOptions& options) {
   std::ranges::sort(site.objects, {},
                     [](const SiteObject& o) { return std::tuple(in_lower_case(o.title), o.path); });
   return site;
-}
-
-DocumentSchema site_schema() {
-  return document_schema("site.v1", "texmesh site report, version 1",
-                         "Output of `texmesh site PACKAGES -o DIR --json`: what the site shows.",
-                         schema_of<SiteReport>());
 }
 
 FolderRule site_folder_rule() {

@@ -98,7 +98,6 @@ struct SiteReport {
     v("faults", s.faults, "Packages that could not be read and are not in the site.");
   }
 };
-DocumentSchema site_schema();
 
 /// What the pages and files of the package at `path` are called in the site: its path without the ending, in
 /// name_key()'s letters, part by part as a file name that every system takes. It depends on the path alone;

@@ -2,12 +2,10 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <nlohmann/json.hpp>
 
 #include "format/base/bounded_json.h"
 #include "format/base/text_bytes.h"
-#include "format/documents/annotations.h"
 #include "pipeline/io/markup.h"
 #include "tools/publish/pages/page.h"
 

@@ -1,6 +1,5 @@
 #pragma once
 #include <map>
-#include <set>
 
 #include "tools/publish/site/site.h"
 

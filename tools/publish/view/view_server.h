@@ -2,7 +2,7 @@
 
 #include <memory>
 
-#include "tools/publish/view/served_files.h"
+#include "pipeline/io/record.h"
 
 namespace texmesh {
 
@@ -18,6 +18,8 @@ struct RequestedRange {
 /// handler is asked.
 RequestedRange requested_range(const std::string& header, std::uint64_t size);
 
+class ServedFiles;
+
 /// Serves a ServedFiles over HTTP: GET and HEAD (OPTIONS for browsers that ask before a request from
 /// elsewhere), one range, ETag with If-None-Match and If-Range, CORS. Everything else is 404 or 405.
 class ViewServer {
@@ -32,5 +34,83 @@ class ViewServer {
   struct Impl;
   std::unique_ptr<Impl> impl_;
 };
+
+/// An open regular file; closed with the object.
+class ServedFile {
+ public:
+  ServedFile(int fd, std::uint64_t bytes, std::string type, std::string etag)
+      : fd_(fd), bytes_(bytes), type_(std::move(type)), etag_(std::move(etag)) {}
+  ~ServedFile();
+  ServedFile(ServedFile&& other) noexcept;
+  ServedFile(const ServedFile&) = delete;
+  ServedFile& operator=(const ServedFile&) = delete;
+
+  std::uint64_t bytes() const { return bytes_; }
+  const std::string& type() const { return type_; }  // media type by the path's ending (SPEC.md, section 3)
+  const std::string& etag() const { return etag_; }  // strong: another file or another time is another tag
+  /// Up to `size` bytes from `offset`; 0 at the end of the file or where it cannot be read.
+  std::size_t read(std::uint64_t offset, char* to, std::size_t size) const;
+
+ private:
+  int fd_;
+  std::uint64_t bytes_;
+  std::string type_, etag_;
+};
+
+/// Packages on this machine.
+struct PackageFolder {
+  std::string path;  // absolute
+  std::vector<std::string>
+      packages;        // relative to it, sorted, at most 10,000; unpacked ones end with a slash
+  bool alone = false;  // one package was named, not a folder of them
+};
+/// `package` is a .texmesh file, an unpacked package, or a folder of such. Hidden names and symbolic links
+/// beneath it are left out. InputError when it is not there or holds no package.
+PackageFolder find_packages(const std::string& package);
+
+/// The files that `texmesh view` serves: the viewer's beneath `/`, packages beneath `/packages/`. Nothing
+/// else can be reached: paths go down part by part, follow no symbolic link, and in a folder of packages lead
+/// to `.texmesh` files and into unpacked packages only, whatever stands beside them.
+class ServedFiles {
+ public:
+  /// `package` as of find_packages(); `viewer` a folder with index.html. InputError when one of them is not
+  /// there or the folder holds no package.
+  ServedFiles(const std::string& package, const std::string& viewer);
+  ~ServedFiles();
+  ServedFiles(const ServedFiles&) = delete;
+  ServedFiles& operator=(const ServedFiles&) = delete;
+
+  /// The file of a decoded URL path ("/", "/assets/x.js", "/packages/bust.texmesh"); nothing where there
+  /// is none. Thread-safe.
+  std::optional<ServedFile> open(const std::string& path) const;
+  /// Paths of the packages relative to `/`, percent-encoded, sorted, at most 10,000; trees end with a slash.
+  std::vector<std::string> packages() const;
+
+ private:
+  int viewer_ = -1, root_ = -1;  // folders
+  std::string only_;             // the one entry of root_ that is served, "" = every package beneath
+};
+
+/// What the viewer offers to choose from, packages.json: texts are left out where there are none.
+struct PackageList {
+  struct Package {
+    std::string url, title, poster;
+    static void fields(auto& s, auto&& v) {
+      v("url", s.url, "");
+      v("title", s.title, kMayMiss, "");
+      v("poster", s.poster, kMayMiss, "");
+    }
+  };
+  std::vector<Package> packages;
+  static void fields(auto& s, auto&& v) { v("packages", s.packages, ""); }
+};
+
+/// The folder with the built viewer: `wanted` where it is not empty, otherwise viewer/ beside the
+/// executable's folder (a build tree) or share/texmesh/viewer of an installation. InputError, which says how
+/// to build it, where there is none.
+std::string viewer_folder(const std::string& wanted);
+/// The same for the folder with the script of <model-viewer> and its licence, model-viewer/.
+inline constexpr const char* kModelViewerScript = "model-viewer.min.js";
+std::string model_viewer_folder(const std::string& wanted);
 
 }  // namespace texmesh

@@ -1,7 +1,7 @@
 // Archives as services give them, and hostile ones: a sentence each.
 #include <gtest/gtest.h>
 
-#include "pipeline/import/archive/archive_about.h"
+#include "pipeline/import/archive/archive_files.h"
 #include "pipeline/import/import.h"
 #include "pipeline/io/file_resolver.h"
 #include "tests/support/images.h"

@@ -1,28 +1,50 @@
 #pragma once
-#include <cstdint>
-#include <optional>
-#include <span>
-#include <string>
-#include <vector>
 
 #include "pipeline/import/import.h"
+#include "pipeline/io/record.h"
 
 namespace texmesh {
 
+enum class ScanDirection : std::uint8_t { kCounterClockwise, kClockwise };
+template <>
+struct EnumNames<ScanDirection> {
+  static constexpr std::array<std::string_view, 2> names{"counter-clockwise", "clockwise"};
+};
+
 /// The JSON of a cylindrical range scan (schemas/range-scan.v1.schema.json).
 struct RangeScanDescription {
+  std::optional<std::string> schema;
   std::string grid;  // EXR, TIFF, PNG or PGM: one column per angle, one row per height, top row first
   // Spread over the grid: its columns and rows are the grid's, at any resolution.
   std::optional<std::string> texture;
-  std::optional<double> alpha_step_deg;        // between columns; without it the columns are a full turn
-  double alpha_start_deg = 0;                  // of the first column: 0 looks along +z, 90 along +x
-  bool clockwise = false;                      // columns run clockwise as seen from above
-  double y_step = 0;                           // between rows, object units, > 0
-  std::optional<double> y_top;                 // of the first row; without it the last row is at 0
-  double radius_scale = 1, radius_offset = 0;  // r = scale * value + offset, object units
+  std::optional<double> alpha_step_deg;  // between columns; without it the columns are a full turn
+  double alpha_start_deg = 0;            // of the first column: 0 looks along +z, 90 along +x
+  ScanDirection direction = {};          // how columns run as seen from above
+  double y_step = 0;                     // between rows, object units, > 0
+  std::optional<double> y_top;           // of the first row; without it the last row is at 0
+  std::optional<double> radius_scale;    // r = scale * value + offset, object units; without it 1
+  double radius_offset = 0;
   std::optional<double> valid_min, valid_max;  // values (of the grid, before scaling) outside are no samples
   // Triangles whose corners differ more in r are left out (the rim of what hides).
   std::optional<double> max_radius_step;
+  static void fields(auto& s, auto&& v) {
+    constexpr Range kAngles{-360, 360}, kLengths{-1e15, 1e15}, kFactors{0, 1e15}, kAll{-1e300, 1e300};
+    v("$schema", s.schema, kNotEmpty, "");
+    v("version", Constant{1}, "");
+    v("type", Constant{"cylindrical-range-scan"}, "");
+    v("grid", s.grid, kNotEmpty, "");
+    v("texture", s.texture, kNotEmpty, "");
+    v("alpha_step_deg", s.alpha_step_deg, Range{0, 120}, "");
+    v("alpha_start_deg", s.alpha_start_deg, FieldRule{.range = kAngles, .may_miss = true}, "");
+    v("direction", s.direction, kMayMiss, "");
+    v("y_step", s.y_step, Range{0, 1e12}, "");
+    v("y_top", s.y_top, kLengths, "");
+    v("radius_scale", s.radius_scale, kFactors, "");
+    v("radius_offset", s.radius_offset, FieldRule{.range = kLengths, .may_miss = true}, "");
+    v("valid_min", s.valid_min, kAll, "");
+    v("valid_max", s.valid_max, kAll, "");
+    v("max_radius_step", s.max_radius_step, kFactors, "");
+  }
 };
 
 /// Strict: an unknown field, a missing one or a value out of range is an InputError that names
