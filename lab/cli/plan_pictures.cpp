@@ -5,6 +5,7 @@
 #include "stages/image/decode_image.h"
 #include "tools/extract/glb/standalone_glb.h"
 #include "tools/extract/package_model.h"
+#include "tools/inspect/provenance.h"
 
 namespace texmesh {
 namespace {
@@ -15,6 +16,19 @@ const ShownPlane& shown_plane(const ShownPackage& shown, std::uint32_t base) {
   if (found == shown.planes.end())
     throw InputError("plan", "/planes", "a plane for texture " + std::to_string(base), "none");
   return *found;
+}
+
+/// The source's textures in the order in which S_0's materials count them.
+std::vector<RenderTexture> textures_like(const RenderedModel& model,
+                                         const std::vector<TextureImage>& wanted) {
+  std::vector<RenderTexture> out;
+  for (const TextureImage& image : wanted) {
+    const auto found = std::ranges::find(model.texture_images, image);
+    if (found == model.texture_images.end())
+      throw InputError("source", "", "an image for the package's " + image_name(image.image), "none");
+    out.push_back(model.textures[static_cast<std::size_t>(found - model.texture_images.begin())]);
+  }
+  return out;
 }
 
 }  // namespace
@@ -60,9 +74,14 @@ PlanPictures::PlanPictures(PackageReader& package, const std::string& source, in
       views_(views),
       context_(context),
       environment_(environment_of(RenderLight::kStudio, context)),
-      finest_(bare_scale(package, 0, context)),
-      best_(package_model(package, {0, PackageTextures::kRung, kBestRung}, context).textures) {
-  if (!source.empty()) source_ = load_rendered_model(source, {}, context);
+      finest_(bare_scale(package, 0, context)) {
+  RenderedModel model = source.empty()
+                            ? package_model(package, {0, PackageTextures::kRung, kBestRung}, context)
+                            : load_rendered_model(source, {}, context);
+  const Provenance made = read_provenance(package.entry(package.manifest().provenance));
+  const bool rebuilt = !source.empty() && made.stages.contains("atlas");
+  source_ = rebuilt ? model.textures : textures_like(model, finest_.texture_images);
+  if (rebuilt) model_ = std::move(model);
 }
 
 const RenderedModel& PlanPictures::scale(int scale) {
@@ -72,7 +91,8 @@ const RenderedModel& PlanPictures::scale(int scale) {
   return scales_.emplace(scale, package_scale(package_, scale, finest_, context_)).first->second;
 }
 
-PlanPictures::Place PlanPictures::place(const BoundingSphere& sphere, int view, double displayed_px) const {
+PlanPictures::Place PlanPictures::place(int view, double displayed_px) const {
+  const BoundingSphere& sphere = finest_.bounds;
   Place out{perspective_camera(camera_of(view, views_, sphere.centre, sphere.radius)), 0};
   const double distance = length(out.camera.eye - sphere.centre);
   const double side =
@@ -101,19 +121,14 @@ std::vector<RenderTexture> PlanPictures::textures_of(const ShownPackage& shown) 
 }
 
 const std::vector<PlanPictures::Reference>& PlanPictures::references(double displayed_px) {
-  if (referenced_px_ == displayed_px) return references_;
+  if (std::exchange(referenced_px_, displayed_px) == displayed_px) return references_;
   references_.clear();
-  referenced_px_ = displayed_px;
-  const RenderScene finest = finest_.scene();
-  const RenderedModel& model = source_ ? *source_ : finest_;
-  const RenderScene scene = model.scene();
+  const RenderScene scene = finest_.scene(), model = model_ ? model_->scene() : scene;
   for (int v = 0; v < views_; ++v) {
-    Reference reference{place(finest_.bounds, v, displayed_px), {}, {}};
-    reference.seen = look(finest, reference.place.camera, reference.place.side_px, context_);
-    const Visibility seen =
-        look(scene, place(model.bounds, v, displayed_px).camera, reference.place.side_px, context_);
-    reference.flip =
-        prepare_flip(shade(scene, seen, source_ ? source_->textures : best_, environment_, context_));
+    Reference reference{place(v, displayed_px), {}, {}};
+    reference.seen = look(scene, reference.place.camera, reference.place.side_px, context_);
+    const Visibility at = look(model, reference.place.camera, reference.place.side_px, context_);
+    reference.flip = prepare_flip(shade(model, at, source_, environment_, context_));
     references_.push_back(std::move(reference));
   }
   return references_;
@@ -145,10 +160,9 @@ RenderedFlip PlanPictures::measure(const ShownPackage& shown, double displayed_p
     if (shown.scale == 0) continue;
     const Visibility seen = look(coarse, reference.place.camera, reference.place.side_px, context_);
     add(coarse, seen, textures, whole);
-    add(coarse, seen, best_, geometry);
+    if (!model_) add(coarse, seen, source_, geometry);
   }
-  if (shown.scale == 0) return {coded.mean(), 0, coded.mean()};
-  return {whole.mean(), geometry.mean(), coded.mean()};
+  return {(shown.scale == 0 ? coded : whole).mean(), geometry.mean(), coded.mean()};
 }
 
 }  // namespace texmesh

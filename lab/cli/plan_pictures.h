@@ -21,16 +21,16 @@ struct ShownPackage {
 /// `list` is the one that the plan is about.
 ShownPackage shown_by(PackageReader& package, const DeliveryPlan& plan, const FragmentList& list);
 
-/// Mean FLIP of lit pictures against the source, over all covered pixels of all views.
+/// Mean FLIP of lit pictures against S_0 with the source's texels, over all covered pixels of all views.
 struct RenderedFlip {
   double whole = 0;
-  double geometry = 0;  // of the scale with the best rungs; 0 for a proxy
+  double geometry = 0;  // of the scale with the source's texels; 0 for a proxy, and for a rebuilt atlas
   double textures = 0;  // of S_0 with the textures that are shown; for a proxy the same as `whole`
 };
 
 /// A plane as a client shows it: each fragment at its rung, row by row; -1, and what is not stored = as the
-/// preview of the full-size plane `base` shows it, scaled up bilinearly. Errors as read_plane(), but for its
-/// size; std::invalid_argument where the number of rungs is another. Same result for any thread count.
+/// preview of the full-size plane `base`, scaled up bilinearly. Errors as read_plane(), but for its size;
+/// std::invalid_argument for another number of rungs. Same result for any thread count.
 Pixels read_shown_plane(PackageReader& package, std::uint32_t base, std::uint32_t plane,
                         std::span<const std::int32_t> rungs, const RunContext& context);
 
@@ -38,8 +38,9 @@ Pixels read_shown_plane(PackageReader& package, std::uint32_t base, std::uint32_
 /// predicts. Same result for any thread count.
 class PlanPictures {
  public:
-  /// `source`: the model file that the package was made from, whatever atlas the package has; "" = S_0 with
-  /// the best rungs stands for it. `views` >= 1 from directions spread over the sphere.
+  /// `source`: the model file that the package was made from, for its texels; "" = the package's best rungs
+  /// stand for the source. Where the package has an atlas of its own the model itself stands for it.
+  /// `views` >= 1 from directions spread over the sphere. InputError where the source has other images.
   PlanPictures(PackageReader& package, const std::string& source, int views, const RunContext& context);
   /// At exactly that displayed height of the object, px. InputError for a proxy that is not there.
   RenderedFlip measure(const ShownPackage& shown, double displayed_px);
@@ -54,7 +55,7 @@ class PlanPictures {
     Visibility seen;
     FlipPicture flip;
   };
-  Place place(const BoundingSphere& sphere, int view, double displayed_px) const;
+  Place place(int view, double displayed_px) const;
   const RenderedModel& scale(int scale);
   std::vector<RenderTexture> textures_of(const ShownPackage& shown);
   RenderedFlip measure_proxy(std::uint32_t proxy, double displayed_px);
@@ -65,8 +66,8 @@ class PlanPictures {
   RunContext context_;
   RenderEnvironment environment_;
   RenderedModel finest_;
-  std::vector<RenderTexture> best_;  // as S_0 counts textures
-  std::optional<RenderedModel> source_;
+  std::vector<RenderTexture> source_;    // as S_0 counts textures
+  std::optional<RenderedModel> model_;   // the source of a package with an atlas of its own
   std::map<int, RenderedModel> scales_;  // but S_0, with its textures
   double referenced_px_ = 0;
   std::vector<Reference> references_;  // of that height

@@ -241,10 +241,8 @@ void add_prediction_study(Command& study) {
   auto [c, args] = study.add(
       "prediction", "Does a plan look as quality.json predicts? FLIP of plans, rendered", run_prediction);
   c.option("PKG", args.packages, "Packages").required();
-  c.option(
-       "--plans", args.plans,
-       "Random plans per package, in turn: what clients choose for a number of bytes, for a link and a time, "
-       "and drawn mips and rungs")
+  c.option("--plans", args.plans,
+           "Random plans of each, in turn: for bytes, for a link and a time, of drawn mips")
       .integer_in(1, 10000)
       .shows_default();
   c.option("--seed", args.seed, "Seed of the plans").shows_default();
@@ -253,11 +251,8 @@ void add_prediction_study(Command& study) {
   c.option("--display", args.display_px, "Displayed height with --budget, px")
       .number_in(16, 2048)
       .shows_default();
-  c.option(
-      "--against", args.against,
-      "The model file that the package was made from, for the source's texels; without it the best rungs "
-      "stand for them",
-      "MODEL");
+  c.option("--against", args.against,
+           "Its model file, for the source's texels; else the best rungs stand for them", "MODEL");
   c.option("--views", args.views, "Directions that are rendered").integer_in(1, 64).shows_default();
   add_jobs_and_json_options(c, args.jobs, args.json);
   c.examples(
@@ -265,7 +260,7 @@ void add_prediction_study(Command& study) {
       "  texmesh-lab study prediction turtle.texmesh --against turtle.glb --budget 200kB --budget 1MB");
   c.notes(
       "FLIP is of lit pictures against S_0 with the source's texels, 0 = equal: of the plan, of its scale "
-      "with the source's texels, of S_0 with its textures.\n"
+      "with the source's texels, of S_0 with its textures. Of a rebuilt atlas it is against the model itself.\n"
       "Exit code: 0, 1 when a file cannot be read, 2 usage.");
 }
 

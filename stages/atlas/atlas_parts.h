@@ -68,10 +68,11 @@ struct AtlasPages {
   std::uint32_t chart_count = 0;
 };
 
-/// Nothing where the pages cannot hold the charts.
+/// Nothing where the pages cannot hold the charts. `most_side_px` is a multiple of 64.
+inline constexpr std::uint32_t kMostSidePx = 8192;
 std::optional<AtlasPages> place_charts(const ConditionedMesh& mesh, const MaterialClasses& classes,
                                        const std::vector<Image>& images, double density,
-                                       const RunContext& context);
+                                       const RunContext& context, std::uint32_t most_side_px = kMostSidePx);
 
 /// The texels of one picture of a page. Texels within two of a chart continue it; blocks of 16 x 16 have one
 /// colour where there is no chart.

@@ -9,7 +9,7 @@
 namespace texmesh {
 namespace {
 
-constexpr std::uint32_t kMostSidePx = 8192, kSideStepPx = 64;
+constexpr std::uint32_t kSideStepPx = 64;
 constexpr std::uint32_t kGutterPx = 4;
 constexpr double kExpectedCover = 0.7;  // of a page by its charts
 constexpr double kMostTexels = 2;       // of those of the source's images
@@ -99,7 +99,7 @@ void set_scales(std::vector<ChartWish>& wishes, const MaterialClasses& classes, 
 double scaled_texels(const ChartWish& w) { return w.area * w.scale * w.scale; }
 
 /// Halves lists of charts across the longest side of the box around their middles, until each fits a page.
-void share_out(std::vector<std::uint32_t> charts, const std::vector<ChartWish>& wishes,
+void share_out(std::vector<std::uint32_t> charts, const std::vector<ChartWish>& wishes, double most_side_px,
                std::vector<std::vector<std::uint32_t>>& pages) {
   double texels = 0;
   Box3d box;
@@ -110,7 +110,7 @@ void share_out(std::vector<std::uint32_t> charts, const std::vector<ChartWish>& 
     texels += scaled_texels(wishes[c]);
     box.extend(middle(c));
   }
-  if (charts.size() < 2 || texels <= kExpectedCover * kMostSidePx * kMostSidePx) {
+  if (charts.size() < 2 || texels <= kExpectedCover * most_side_px * most_side_px) {
     std::ranges::sort(charts);
     pages.push_back(std::move(charts));
     return;
@@ -121,8 +121,9 @@ void share_out(std::vector<std::uint32_t> charts, const std::vector<ChartWish>& 
   std::size_t first = 0;
   for (double half = 0; first + 1 < charts.size() && half < texels / 2; ++first)
     half += scaled_texels(wishes[charts[first]]);
-  share_out({charts.begin(), charts.begin() + static_cast<std::ptrdiff_t>(first)}, wishes, pages);
-  share_out({charts.begin() + static_cast<std::ptrdiff_t>(first), charts.end()}, wishes, pages);
+  share_out({charts.begin(), charts.begin() + static_cast<std::ptrdiff_t>(first)}, wishes, most_side_px,
+            pages);
+  share_out({charts.begin() + static_cast<std::ptrdiff_t>(first), charts.end()}, wishes, most_side_px, pages);
 }
 
 /// Some of the charts, in texels instead of object units.
@@ -170,10 +171,11 @@ double packed_scale(const AtlasMesh& packed, double texels) {
   return std::sqrt(area * packed.width_px * packed.height_px / texels);
 }
 
-std::optional<AtlasMesh> pack_page(const PageCharts& page, const RunContext& context) {
-  const auto stepped = [](double side) {
+std::optional<AtlasMesh> pack_page(const PageCharts& page, std::uint32_t most_side_px,
+                                   const RunContext& context) {
+  const auto stepped = [most_side_px](double side) {
     const double steps = std::ceil(std::max(side, 1.0) / kSideStepPx);
-    return static_cast<std::uint32_t>(std::min(steps * kSideStepPx, double{kMostSidePx}));
+    return static_cast<std::uint32_t>(std::min(steps * kSideStepPx, double(most_side_px)));
   };
   std::uint32_t side_px = stepped(std::sqrt(page.texels / kExpectedCover));
   std::optional<AtlasMesh> best;
@@ -181,8 +183,8 @@ std::optional<AtlasMesh> pack_page(const PageCharts& page, const RunContext& con
     auto packed = pack_atlas(page.surface, page.charts, side_px, side_px, kGutterPx, context);
     const double scale = packed ? packed_scale(*packed, page.texels) : 0.5;
     if (packed) best = std::move(packed);
-    if (scale >= kNearEnough || side_px == kMostSidePx) break;
-    side_px = std::max(stepped(side_px / scale), std::min(side_px + kSideStepPx, kMostSidePx));
+    if (scale >= kNearEnough || side_px == most_side_px) break;
+    side_px = std::max(stepped(side_px / scale), std::min(side_px + kSideStepPx, most_side_px));
   }
   return best;
 }
@@ -282,7 +284,7 @@ void add_page(const PageCharts& charts, const AtlasMesh& packed, const TexturedS
 
 std::optional<AtlasPages> place_charts(const ConditionedMesh& mesh, const MaterialClasses& classes,
                                        const std::vector<Image>& images, double density,
-                                       const RunContext& context) {
+                                       const RunContext& context, std::uint32_t most_side_px) {
   const TexturedSurface textured = textured_surface(mesh, classes);
   if (textured.triangles.empty()) return std::nullopt;
   const SurfaceCharts charts = segment_charts(textured.surface, context, kLimits);
@@ -298,10 +300,10 @@ std::optional<AtlasPages> place_charts(const ConditionedMesh& mesh, const Materi
       if (wishes[c].group == group) of_class.push_back(c);
     if (of_class.empty()) continue;
     std::vector<std::vector<std::uint32_t>> shares;
-    share_out(std::move(of_class), wishes, shares);
+    share_out(std::move(of_class), wishes, most_side_px, shares);
     for (const std::vector<std::uint32_t>& share : shares) {
       const PageCharts page = charts_of_page(textured, charts, wishes, share);
-      const auto packed = pack_page(page, context);
+      const auto packed = pack_page(page, most_side_px, context);
       if (!packed) return std::nullopt;
       add_page(page, *packed, textured, out);
     }

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "stages/atlas/atlas_parts.h"
 #include "stages/base/run_context.h"
 #include "stages/charts/texture_frame.h"
 #include "stages/condition/condition.h"
@@ -200,6 +201,28 @@ TEST(Atlas, AlphaStaysBesideMaterialsWithoutTextures) {
     EXPECT_EQ(texels.at(std::uint32_t(at.x * float(texels.width_px)),
                         std::uint32_t(at.y * float(texels.height_px)))[3],
               77);
+  }
+}
+
+/// As 8k textures do beyond 8192 px, in small.
+TEST(Atlas, WhatNoPageHoldsIsSharedOut) {
+  constexpr std::uint32_t kMost = 64;
+  const ConditionedMesh mesh =
+      condition_mesh(scattered(testing::bumpy_sphere(20, 30)), false, {}, RunContext{});
+  const std::vector<Image> images{places(512)};
+  const MaterialClasses classes = find_classes({data_material(0)}, images);
+  const auto pages = place_charts(mesh, classes, images, 1, RunContext{}, kMost);
+  ASSERT_TRUE(pages);
+  EXPECT_GT(pages->pages.size(), 1u);
+  std::vector<std::size_t> triangles(pages->pages.size(), 0);
+  for (const std::uint32_t page : pages->page_of) ++triangles.at(page);
+  for (std::size_t p = 0; p < pages->pages.size(); ++p) {
+    EXPECT_LE(pages->pages[p].side_px, kMost);
+    EXPECT_EQ(pages->pages[p].triangles.size(), triangles[p]);
+  }
+  for (const std::uint32_t v : pages->vertex_of) {
+    const Vec2f uv = pages->uvs.at(v);
+    EXPECT_TRUE(uv.x >= 0 && uv.x <= 1 && uv.y >= 0 && uv.y <= 1);
   }
 }
 
