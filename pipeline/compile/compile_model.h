@@ -8,6 +8,8 @@
 
 namespace texmesh {
 
+struct ModelSize;  // stage_table.h
+
 struct CompileRequest {
   std::string input;       // path of the model file
   std::string output;      // path of the package; "" = compile, check, write nothing

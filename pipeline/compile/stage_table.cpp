@@ -103,8 +103,8 @@ Stage stage(StageTitle title, Read read, Made made, Declared declared,
 
 /// Waits for the skeleton only where R(v) is the signal.
 Stage scale_space_stage(const CompileOptions& o) {
-  const StageTitle title{
-      "ssf", kSsfVersion, "mesh -> scale map: the highest scale at which a vertex is a feature", {.01, .62}};
+  const StageTitle title{"ssf", kSsfVersion,
+                         "mesh -> scale map: the highest scale at which a vertex is a feature"};
   if (o.ssf.signal == ScaleSignal::kRadius)
     return stage(title, inputs(kImportedMesh, kConditionedMesh, kSkeleton), outputs(kScaleMap),
                  read_of(o, o.ssf), {}, filter_radius);
@@ -132,10 +132,10 @@ Results<ConditionedMesh, Materials, Images> chart_import(const ConditionedMesh& 
 }
 
 Stage atlas_stage(const CompileOptions& o) {
-  return stage(
-      {"atlas", kAtlasVersion, "mesh, images -> few large charts with the source's texels", {.2, 4, 1}},
-      inputs(kConditionedMesh, kMaterials, kImages), outputs(kChartedMesh, kChartedMaterials, kChartedImages),
-      read_of(o, o.atlas), kImageLibraries, chart_import);
+  return stage({"atlas", kAtlasVersion, "mesh, images -> few large charts with the source's texels"},
+               inputs(kConditionedMesh, kMaterials, kImages),
+               outputs(kChartedMesh, kChartedMaterials, kChartedImages), read_of(o, o.atlas), kImageLibraries,
+               chart_import);
 }
 
 AtlasSample sample_source(const ConditionedMesh& mesh, const Materials& materials, const Images& images,
@@ -152,7 +152,7 @@ std::vector<Stage> with_atlas(std::vector<Stage> table, const CompileOptions& o)
 
 Stage scales_stage(const CompileOptions& o) {
   const Shown shown = shown_with(o);
-  return stage({"scales", kScalesVersion, "kept scales -> GLB files, vertex splits", {.01, .5}},
+  return stage({"scales", kScalesVersion, "kept scales -> GLB files, vertex splits"},
                inputs(kNestedScales, kPerceptualValues, shown.materials, shown.images, kFragments, kPreviews),
                outputs(kScaleFiles), read_of(o, o.scales),
                {"draco", "libjpeg-turbo", "meshoptimizer", "zlib"}, write_scales);
@@ -160,10 +160,7 @@ Stage scales_stage(const CompileOptions& o) {
 
 Stage gltf_scales_stage(const CompileOptions& o) {
   const Shown shown = shown_with(o);
-  return stage({"gltf_scales",
-                kGltfScalesVersion,
-                "scales of the step function -> GLBs for viewers of glTF",
-                {.01, .26}},
+  return stage({"gltf_scales", kGltfScalesVersion, "scales of the step function -> GLBs for viewers of glTF"},
                inputs(kNestedScales, kPerceptualValues, shown.materials, shown.images, kFragments,
                       kFilledPlanes, kPreviews, kTables, kScaleFiles, kQuality),
                outputs(kGltfScales), read_of(o, o.scales),
@@ -172,7 +169,7 @@ Stage gltf_scales_stage(const CompileOptions& o) {
 
 Stage package_stage(const CompileOptions& o) {
   return stage(
-      {"package", kPackageVersion, "everything -> the container", {.01, .06, .02}},
+      {"package", kPackageVersion, "everything -> the container"},
       inputs(kNestedScales, kPerceptualValues, shown_with(o).images, kFragments, kLadder, kPreviews, kTables,
              kThesisTables, kScaleFiles, kGltfScales, kQuality, kPoster, kProxies, kSourceAbout, kProvenance),
       outputs(kPackage), read_of(o, o.package, o.perceptual_values.jnd, o.import.up), {}, package_all);
@@ -183,74 +180,53 @@ Stage package_stage(const CompileOptions& o) {
 std::vector<Stage> stage_table(const CompileOptions& o) {
   const Shown shown = shown_with(o);
   std::vector<Stage> table{
-      stage({"import", kImportVersion, "file -> mesh, materials, images, what it says of itself", {.01, .02}},
+      stage({"import", kImportVersion, "file -> mesh, materials, images, what it says of itself"},
             inputs(kSource), outputs(kImportedMesh, kMaterials, kImages, kSourceAbout), read_of(o, o.import),
             {"draco", "libpng", "libzstd", "meshoptimizer", "openimageio", "tinygltf", "zlib"},
             import_source),
-      stage({"condition",
-             kConditionVersion,
-             "mesh -> 2-manifold mesh: weld, drop degenerates, split, components",
-             {.01, .12}},
+      stage({"condition", kConditionVersion,
+             "mesh -> 2-manifold mesh: weld, drop degenerates, split, components"},
             inputs(kImportedMesh), outputs(kConditionedMesh), read_of(o, o.condition), {}, condition_import),
-      stage({"skeletonization", kSkeletonizationVersion, "mesh -> curve skeleton, R(v)", {1.3}},
+      stage({"skeletonization", kSkeletonizationVersion, "mesh -> curve skeleton, R(v)"},
             inputs(kConditionedMesh), outputs(kSkeleton), read_of(o, o.skeletonization),
             {"cgal", "meshoptimizer"}, skeletonize),
       scale_space_stage(o),
-      stage({"simplification",
-             kSimplificationVersion,
-             "mesh, scale map -> collapse sequence, nested scales",
-             {.01, .95}},
+      stage({"simplification", kSimplificationVersion, "mesh, scale map -> collapse sequence, nested scales"},
             inputs(shown.mesh, kScaleMap), outputs(kNestedScales), read_of(o, o.simplification), {},
             simplify),
-      stage({"perceptual_values",
-             kPerceptualValuesVersion,
-             "scales, R -> perceptual values, major scales, step function",
-             {.07, .38}},
+      stage({"perceptual_values", kPerceptualValuesVersion,
+             "scales, R -> perceptual values, major scales, step function"},
             inputs(kNestedScales, kSkeleton), outputs(kPerceptualValues), read_of(o, o.perceptual_values), {},
             measure_perceptual_values),
-      stage({"fragmentation",
-             kFragmentationVersion,
-             "images, mesh -> grids, coverage, feature counts, eta",
-             {.01, .12, .02}},
+      stage({"fragmentation", kFragmentationVersion, "images, mesh -> grids, coverage, feature counts, eta"},
             inputs(shown.mesh, shown.materials, shown.images, kScaleMap), outputs(kFragments),
             read_of(o, o.fragmentation), {"openimageio"}, fragment_textures),
-      stage(
-          {"fill", kFillVersion, "images, coverage -> filled texels (derived, never stored)", {.01, 0, .37}},
-          inputs(kFragments, shown.images), derived(kFilledPlanes),
-          read_of(o, o.fragmentation.fill, o.ladder.mode, o.ladder.uncovered),
-          {"libjpeg-turbo", "libpng", "openimageio"}, fill_fragments),
-      stage({"zim", kZimVersion, "fragments -> predictors Z, I, M, VQP", {.01, 0, .11}},  //
+      stage({"fill", kFillVersion, "images, coverage -> filled texels (derived, never stored)"},
+            inputs(kFragments, shown.images), derived(kFilledPlanes),
+            read_of(o, o.fragmentation.fill, o.ladder.mode, o.ladder.uncovered),
+            {"libjpeg-turbo", "libpng", "openimageio"}, fill_fragments),
+      stage({"zim", kZimVersion, "fragments -> predictors Z, I, M, VQP"},  //
             inputs(kFragments, kFilledPlanes), outputs(kPredictors), read_of(o, o.zim), {}, predict_quality),
-      stage({"previews", kPreviewsVersion, "fragments -> a small JPEG of every texture", {.01, 0, .02}},
+      stage({"previews", kPreviewsVersion, "fragments -> a small JPEG of every texture"},
             inputs(kFragments, kFilledPlanes), outputs(kPreviews),
             read_of(o, o.ladder.preview_quality, o.ladder.subsampling), {"libjpeg-turbo"}, preview_fragments),
-      stage({"ladder",
-             kLadderVersion,
-             "fragments, previews -> rungs of streams in the chosen codec",
-             {.01, .26, .51, .1}},
+      stage({"ladder", kLadderVersion, "fragments, previews -> rungs of streams in the chosen codec"},
             inputs(kFragments, kFilledPlanes, kPreviews, shown.images), outputs(kLadder),
             read_of(o, o.ladder), {"libjpeg-turbo", "libwebp"}, encode_ladder),
-      stage({"lut",
-             kLutVersion,
-             "fragments, predictors, ladder, previews -> quality and size tables",
-             {.01, 0, .27}},
+      stage({"lut", kLutVersion, "fragments, predictors, ladder, previews -> quality and size tables"},
             inputs(kFragments, kFilledPlanes, kPredictors, kLadder, kPreviews),
             outputs(kTables, kThesisTables), read_of(o, o.lut), {"libjpeg-turbo", "libwebp"},
             measure_fragments),
       scales_stage(o),
-      stage({"quality",
-             kQualityVersion,
-             "scales, rungs -> losses of lit pictures, switch sizes",
-             {2.3, .76, 1.2, .44}},
+      stage({"quality", kQualityVersion, "scales, rungs -> losses of lit pictures, switch sizes"},
             inputs(kNestedScales, kPerceptualValues, shown.materials, shown.images, kFragments, kFilledPlanes,
                    kLadder, kPreviews, kTables),
             outputs(kQuality), read_of(o, o.quality), kImageLibraries, measure_quality),
       gltf_scales_stage(o),
-      stage({"poster", kPosterVersion, "S_0 with the source's texels -> a picture of the object", {.16}},
+      stage({"poster", kPosterVersion, "S_0 with the source's texels -> a picture of the object"},
             inputs(kNestedScales, shown.materials, kFragments, kFilledPlanes), outputs(kPoster),
             read_of(o, o.poster), {"libjpeg-turbo"}, make_poster),
-      stage({"proxies", kProxiesVersion, "S_0 -> small GLBs with atlases and textures of their own",
-             o.proxies.mode == ProxyMode::kNone ? StageTime{.01} : StageTime{.01, 0, .21, .61, 8.9}},
+      stage({"proxies", kProxiesVersion, "S_0 -> small GLBs with atlases and textures of their own"},
             inputs(kNestedScales, shown.materials, shown.images, kFragments, kFilledPlanes),
             outputs(kProxies), read_of(o, o.proxies), {"draco", "libwebp", "meshoptimizer"}, make_proxies),
       package_stage(o),
@@ -260,10 +236,8 @@ std::vector<Stage> stage_table(const CompileOptions& o) {
 
 Stage atlas_choice_stage(const CompileOptions& o) {
   const bool keeps = o.atlas.mode == AtlasMode::kKeep;
-  const StageTitle title{keeps ? "atlas_choice" : "atlas_choice_rebuilt",
-                         kAtlasChoiceVersion,
-                         "source, nested scales -> lit pictures for the bytes of loads",
-                         {2, 1}};
+  const StageTitle title{keeps ? "atlas_choice" : "atlas_choice_rebuilt", kAtlasChoiceVersion,
+                         "source, nested scales -> lit pictures for the bytes of loads"};
   if (keeps)
     return stage(title, inputs(kConditionedMesh, kMaterials, kImages, kNestedScales, kProxies),
                  outputs(kAtlasSample), Options<>{}, kImageLibraries, sample_source);
@@ -272,10 +246,52 @@ Stage atlas_choice_stage(const CompileOptions& o) {
       outputs(kAtlasSample), Options<>{}, kImageLibraries, sample_atlas);
 }
 
-std::map<std::string, double> time_shares(const std::vector<Stage>& table, const ModelSize& size) {
+namespace {
+
+/// Seconds, about: they only shape the progress bar and the estimate of the time left. Of ten scans (4,000 to
+/// 150,000 triangles) on a quiet machine.
+struct StageTime {
+  double fixed = 0, per_100k_triangles = 0, per_10_megapixels = 0, per_image = 0;
+  double many_triangles = 0;  // more where there are 40,000
+};
+
+const std::map<std::string, StageTime>& stage_times() {
+  static const std::map<std::string, StageTime> times{
+      {"import", {.01, .02}},
+      {"condition", {.01, .12}},
+      {"atlas", {.2, 4, 1}},
+      {"skeletonization", {1.3}},
+      {"ssf", {.01, .62}},
+      {"simplification", {.01, .95}},
+      {"perceptual_values", {.07, .38}},
+      {"fragmentation", {.01, .12, .02}},
+      {"fill", {.01, 0, .37}},
+      {"zim", {.01, 0, .11}},
+      {"previews", {.01, 0, .02}},
+      {"ladder", {.01, .26, .51, .1}},
+      {"lut", {.01, 0, .27}},
+      {"scales", {.01, .5}},
+      {"quality", {2.3, .76, 1.2, .44}},
+      {"gltf_scales", {.01, .26}},
+      {"poster", {.16}},
+      {"proxies", {.01, 0, .21, .61, 8.9}},
+      {"package", {.01, .06, .02}},
+  };
+  return times;
+}
+
+}  // namespace
+
+std::map<std::string, double> time_shares(const CompileOptions& options, const ModelSize& m) {
   std::map<std::string, double> shares;
   double all = 0;
-  for (const Stage& stage : table) all += shares[stage.name] = stage.time.of(size);
+  for (const Stage& stage : stage_table(options)) {
+    const bool is_off = stage.name == "proxies" && options.proxies.mode == ProxyMode::kNone;
+    const StageTime t = is_off ? StageTime{.01} : stage_times().at(stage.name);
+    all += shares[stage.name] = t.fixed + t.per_100k_triangles * m.triangles / 1e5 +
+                                t.per_10_megapixels * m.megapixels / 10 + t.per_image * m.images +
+                                (m.triangles < 40e3 ? 0 : t.many_triangles);
+  }
   for (auto& [stage, share] : shares) share /= all;
   return shares;
 }

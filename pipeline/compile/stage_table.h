@@ -65,8 +65,13 @@ Stage atlas_choice_stage(const CompileOptions& options);
 /// The graph with default options: for those who ask for names, versions and inputs.
 const std::vector<Stage>& default_stage_table();
 
-/// Of each stage, about which share of the model's time it takes; together 1.
-std::map<std::string, double> time_shares(const std::vector<Stage>& table, const ModelSize& size);
+/// What is known of a model once it is imported.
+struct ModelSize {
+  double triangles = 20e3, megapixels = 16, images = 2;  // of all images; a usual scan
+};
+
+/// Of each stage of stage_table(), about which share of the model's time it takes; together 1.
+std::map<std::string, double> time_shares(const CompileOptions& options, const ModelSize& size);
 
 /// The stages of stage_table() that `last` needs, directly or not, in the table's order, and `last` itself:
 /// for commands that want to see what is in the middle of the graph.

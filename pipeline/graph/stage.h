@@ -77,30 +77,12 @@ struct StageResult {
   Notes notes;
 };
 
-/// What is known of a model once it is imported.
-struct ModelSize {
-  double triangles = 20e3, megapixels = 16, images = 2;  // of all images; a usual scan
-};
-
-/// Seconds, about: they only shape the progress bar and the estimate of the time left.
-/// Of ten scans (4,000 to 150,000 triangles) on a quiet machine: the estimate was right within a factor
-/// of 1.5 for nine.
-struct StageTime {
-  double fixed = 0, per_100k_triangles = 0, per_10_megapixels = 0, per_image = 0;
-  double many_triangles = 0;  // more where there are 40,000
-  double of(const ModelSize& m) const {
-    return fixed + per_100k_triangles * m.triangles / 1e5 + per_10_megapixels * m.megapixels / 10 +
-           per_image * m.images + (m.triangles < 40e3 ? 0 : many_triangles);
-  }
-};
-
 /// One node of the graph, as make_stage() makes it. Its key consists of name, version, options, libraries and
 /// the digests of its inputs; `run` has the options inside and gets nothing but its inputs.
 struct Stage {
   std::string name;
   int version = 1;
   std::string summary;  // one line for `texmesh compile --stages`
-  StageTime time;
   std::vector<ArtefactName> inputs;
   std::vector<StageOutput> outputs;
   std::vector<StageOption> options;
@@ -205,7 +187,6 @@ struct StageTitle {
   std::string name;
   int version = 1;
   std::string summary;
-  StageTime time = {};
 };
 
 template <class T>
@@ -259,7 +240,6 @@ Stage describe_stage(StageTitle title, const Inputs<I...>& read, const Options<P
   stage.name = std::move(title.name);
   stage.version = title.version;
   stage.summary = std::move(title.summary);
-  stage.time = title.time;
   stage.libraries = std::move(libraries);
   std::apply([&](auto... artefact) { (stage.inputs.emplace_back(artefact), ...); }, read.artefacts);
   std::apply([&](const auto&... option) { (stage.options.push_back(option.for_key()), ...); },

@@ -165,9 +165,8 @@ int compile(const WorkerTask& task, EventWriter& events) {
   context.threads = task.threads;
   context.cancelled = &g_cancelled;
   const std::unique_ptr<Store> store = store_of(task);
-  request.size_known = [&events,
-                        table = stage_table(resolve_options(request.options))](const ModelSize& size) {
-    events.write(SharesTold{"", time_shares(table, size)});
+  request.size_known = [&events, options = resolve_options(request.options)](const ModelSize& size) {
+    events.write(SharesTold{"", time_shares(options, size)});
   };
   request.size_known(ModelSize{});
   if (task.job.forecast) {
