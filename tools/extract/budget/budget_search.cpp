@@ -11,9 +11,11 @@
 // coarser, while the sum of losses falls. What a mesh leaves of the bytes is dealt out along the curves,
 // where it takes away most loss.
 // 5. The file is written and filled up to at least 98 % of the bytes (Filling).
-// 6. Sums of losses are guesses. With --best whole pictures decide in a small file: files of other likely
-// meshes, other sizes and codings of the texture that loses most. In a large file textures may be full: then
-// the mesh is finer.
+// 6. Sums of losses are guesses, so in a small file whole pictures decide between few: other sizes of the
+// texture that loses most, a leaner mesh, other shares. One that is plainly worse in a view is not looked at
+// further. With
+// --best many more files are looked at, in a small file those of other likely meshes and codings, too. In a
+// large file textures may be full: then the mesh is finer.
 // 7. Last, proxies of the package are tried in its place (offer_proxies()).
 // Where the bytes hold S_0 and all of the source's own images, nothing is looked for (whole_source()).
 #include "tools/extract/budget/budget_search.h"
@@ -22,6 +24,7 @@
 
 #include "delivery/cpp/decide/texture_loss.h"
 #include "format/base/portable_math.h"
+#include "stages/base/parallel.h"
 #include "tools/extract/proxy/proxy_search.h"
 
 namespace texmesh {
@@ -33,7 +36,9 @@ constexpr double kFewestExtraBits = -3, kMostExtraBits = 9;
 constexpr int kMeshTries = 12;
 constexpr double kSurely = 0.9;  // of a loss that others tell
 constexpr std::uint64_t kLookAtFilesBelow = 200000;
-constexpr double kLikely = 1.2;  // times the least joined loss
+constexpr int kFewLooks = 6;           // beside the first
+constexpr double kPlainlyWorse = 1.1;  // in one view
+constexpr double kLikely = 1.2;        // times the least joined loss
 constexpr std::size_t kMostLikely = 4;
 constexpr double kWorthALook = 1.15;  // times the least joined loss that was seen, by tables
 constexpr double kUsualBytes = 3.5, kLeastBytes = 1.5;          // of a coded triangle
@@ -188,12 +193,10 @@ Extracted Search::run(const std::function<void(double)>& report) {
 FoundFile Search::filled_file() {
   FoundFile found = file_of(best_, allocation_of(best_));
   if (!filling_.fits(found.file) || reference_.wishes.fast()) return found;
-  if (reference_.wishes.best()) {
-    if (bytes_ <= kLookAtFilesBelow)
-      look_at_files(found);
-    else
-      try_smaller_than_stored(found);
-  }
+  if (bytes_ <= kLookAtFilesBelow)
+    reference_.wishes.best() ? look_at_files(found) : look_at_few_files(found);
+  else if (reference_.wishes.best())
+    try_smaller_than_stored(found);
   if (!filling_.fills(found.file)) fill_by_mesh(found);
   return found;
 }
@@ -257,6 +260,7 @@ void Search::choose_mesh_by_tables() {
     for (std::size_t scale = 0; scale < scales().size(); ++scale)
       for (int coding = 0; coding < kMeshCodings; ++coding) {
         if (reference_.wishes.scale && scale != known_.scale) continue;
+        if (reference_.wishes.fast() && scale == 0 && coding + 1 < kMeshCodings) continue;  // takes long
         const double loss = likely_loss({scale, coding});
         if (loss < least) least = loss, likely = {scale, coding};
       }
@@ -361,6 +365,17 @@ void Search::look_at_files(FoundFile& best) {
   try_other_files(best);
 }
 
+/// What --best changes most often, in turn: the size of the texture that loses most, the mesh's coding, what
+/// other textures get.
+void Search::look_at_few_files(FoundFile& best) {
+  if (best.images.images.empty() || reference_.cameras.empty()) return;
+  look_at(best);
+  looks_left_ = kFewLooks;
+  try_other_sizes(best, {1, -1});
+  try_other_codings_of_mesh(best);
+  try_other_shares(best);
+}
+
 /// But for the best.
 std::vector<MeshKey> Search::likeliest() const {
   std::vector<std::pair<double, MeshKey>> order;
@@ -374,12 +389,12 @@ std::vector<MeshKey> Search::likeliest() const {
 }
 
 FoundFile Search::file_of(const MeshKey& key, const DealtBytes& images) {
-  return {key, images, filling_.fill(mesh(key), images)};
+  return {key, images, filling_.fill(mesh(key), images), 1e9, {}};
 }
 
 bool Search::replace_if_nearer(FoundFile found, FoundFile& best) {
   if (!filling_.fills(found.file)) return false;
-  look_at(found);
+  look_at(found, reference_.wishes.best() ? nullptr : &best);
   if (!(found.difference < best.difference)) return false;
   best = std::move(found);
   return true;
@@ -390,14 +405,15 @@ bool Search::try_file(const MeshKey& key, const DealtBytes& images, FoundFile& b
   TriedFile tried{key, images.last, {}};
   for (const CodedImage& image : images.images) tried.plans.push_back(image.plan);
   tried.plans[images.last].quality = 0;
-  if (std::ranges::find(tried_, tried) != tried_.end()) return false;
+  if (looks_left_ == 0 || std::ranges::find(tried_, tried) != tried_.end()) return false;
+  --looks_left_;
   tried_.push_back(std::move(tried));
   return replace_if_nearer(file_of(key, images), best);
 }
 
-bool Search::try_other_sizes(FoundFile& best) {
+bool Search::try_other_sizes(FoundFile& best, std::initializer_list<int> all_steps) {
   bool nearer = false;
-  for (const int steps : {-1, 1, -2, 2, 3})
+  for (const int steps : all_steps)
     while (const auto other = with_largest_loss_resized(best.images, steps, candidates_)) {
       if (!try_file(best.key, *other, best)) break;
       nearer = true;
@@ -439,7 +455,8 @@ bool Search::try_other_shares(FoundFile& best) {
 
 bool Search::try_other_codings_of_mesh(FoundFile& best) {
   bool nearer = false;
-  for (const int step : {1, -1})
+  const int usual = reference_.wishes.best() ? 1 : -1;  // leaner first
+  for (const int step : {usual, -usual})
     for (;;) {
       MeshKey key = best.key;
       key.coding += step;
@@ -455,7 +472,7 @@ void Search::try_other_files(FoundFile& best) {
   if (best.images.images.empty()) return;
   bool nearer = true;
   for (int i = 0; i < kMostRounds && nearer; ++i) {
-    nearer = try_other_sizes(best);
+    nearer = try_other_sizes(best, {-1, 1, -2, 2, 3});
     nearer |= try_other_codings(best);
     nearer |= try_other_shares(best);
     nearer |= try_other_codings_of_mesh(best);
@@ -472,16 +489,35 @@ void Search::try_smaller_than_stored(FoundFile& best) {
       try_file(best.key, *other, best);
 }
 
-double Search::difference_of(const MeshKey& key, const FilledFile& file) {
+void Search::look_at(FoundFile& found, const FoundFile* rival) {
   std::vector<RenderTexture> textures(reference_.shown.size());
   for (std::size_t i = 0; i < reference_.images.size(); ++i)
     for (auto& [t, texture] :
-         candidates_.shown_by(i, file.images.at(reference_.images[i].image), reference_.context))
+         candidates_.shown_by(i, found.file.images.at(reference_.images[i].image), reference_.context))
       textures[t] = std::move(texture);
-  std::unique_ptr<const LitViews> made;
-  if (!key.is_finest()) made = candidates_.made_views(key);
-  return reference_.whole_meter->difference(made ? *made : *reference_.finest_views, textures,
-                                            reference_.context);
+  const LitMeter& meter = *reference_.whole_meter;
+  found.parts.assign(meter.count(), 0);
+  RunContext one = reference_.context;
+  one.threads = 1;
+  const auto look = [&](const std::vector<std::size_t>& views) {
+    std::unique_ptr<const LitViews> made;
+    if (!found.key.is_finest()) made = candidates_.made_views(found.key, views);
+    const LitViews& seen = made ? *made : *reference_.finest_views;
+    parallel_for(reference_.context, views.size(), 1, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t k = begin; k < end; ++k)
+        found.parts[views[k]] = meter.part(views[k], seen, made ? k : views[k], textures,
+                                           views.size() == 1 ? reference_.context : one);
+    });
+  };
+  const std::size_t first = meter.fullest();
+  look({first});
+  if (rival && rival->difference < kNothing && found.parts[first] > kPlainlyWorse * rival->parts[first])
+    return;
+  std::vector<std::size_t> others;
+  for (std::size_t v = 0; v < meter.count(); ++v)
+    if (v != first) others.push_back(v);
+  look(others);
+  found.difference = std::accumulate(found.parts.begin(), found.parts.end(), 0.0);
 }
 
 /// `from` with its mesh coded finer by parts of a bit: the largest file that was found. Nothing
@@ -544,7 +580,8 @@ Extracted Search::finish(FoundFile found) {
     out.difference = std::min(1.0, std::sqrt(joined(out.mesh_difference) + found.images.loss));
   } else {
     out.mesh_difference = mesh.geometry;
-    out.difference = found.difference < 1 ? found.difference : difference_of(key, file);
+    if (!(found.difference < kNothing)) look_at(found);
+    out.difference = found.difference;
   }
   out.glb = std::move(file.glb);
   return out;

@@ -31,6 +31,7 @@ struct FoundFile {
   DealtBytes images;
   FilledFile file;
   double difference = 1e9;
+  std::vector<double> parts;  // of the difference, by view; 0 = not looked at
 };
 
 /// The search for the file of one number of bytes: see the top of the .cpp.
@@ -49,7 +50,9 @@ class Search {
   const MeshFile& mesh(const MeshKey& key);
   /// The file that fills the bytes. It is not looked at.
   FoundFile file_of(const MeshKey& key, const DealtBytes& images);
-  void look_at(FoundFile& found) { found.difference = difference_of(found.key, found.file); }
+  /// In whole pictures. `rival`: one that looks plainly worse in the view that shows most is not looked at
+  /// any further, and its difference stays.
+  void look_at(FoundFile& found, const FoundFile* rival = nullptr);
   /// The texture that loses most in other sizes and codings, with more or fewer bytes for others, and with
   /// the mesh coded finer or leaner, as long as that is nearer.
   void try_other_files(FoundFile& best);
@@ -83,18 +86,18 @@ class Search {
   double loss_of(const MeshKey& key);
 
   void look_at_files(FoundFile& best);
+  void look_at_few_files(FoundFile& best);
   std::vector<MeshKey> likeliest() const;
   // Whether the best has changed.
   bool replace_if_nearer(FoundFile found, FoundFile& best);
   bool try_file(const MeshKey& key, const DealtBytes& images, FoundFile& best);
-  bool try_other_sizes(FoundFile& best);
+  bool try_other_sizes(FoundFile& best, std::initializer_list<int> all_steps);
   bool try_other_codings(FoundFile& best);
   bool try_other_codings_of_mesh(FoundFile& best);
   bool try_other_shares(FoundFile& best);
 
   std::optional<FoundFile> larger_by_bits(const FoundFile& from, std::size_t scale, int coding);
   void fill_by_mesh(FoundFile& best);
-  double difference_of(const MeshKey& key, const FilledFile& file);
   Extracted finish(FoundFile found);
 
   const Reference& reference_;
@@ -113,6 +116,7 @@ class Search {
   bool only_likely_ = false;  // meshes that tables make hopeless are not looked at
   double least_ = 1e9;
   std::vector<TriedFile> tried_;
+  int looks_left_ = 1000;  // at files other than the first
 };
 
 }  // namespace texmesh

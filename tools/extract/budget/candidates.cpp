@@ -105,8 +105,11 @@ const LitMesh& Candidates::lit_mesh(const MeshKey& key) {
   return *c.lit;
 }
 
-std::unique_ptr<const LitViews> Candidates::made_views(const MeshKey& key) {
-  return std::make_unique<LitViews>(lit_mesh(key), reference_.cameras, reference_.context);
+std::unique_ptr<const LitViews> Candidates::made_views(const MeshKey& key,
+                                                       const std::vector<std::size_t>& cameras) {
+  std::vector<LitCamera> some;
+  for (const std::size_t c : cameras) some.push_back(reference_.cameras[c]);
+  return std::make_unique<LitViews>(lit_mesh(key), some, reference_.context);
 }
 
 void Candidates::forget(const MeshKey& key) {

@@ -96,8 +96,8 @@ class Candidates {
       : reference_(reference), textures_(textures), for_several_(for_several) {}
 
   const MeshCandidate& mesh(const MeshKey& key);
-  /// What cameras see of the mesh in whole pictures.
-  std::unique_ptr<const LitViews> made_views(const MeshKey& key);
+  /// What some of the cameras see of the mesh in whole pictures.
+  std::unique_ptr<const LitViews> made_views(const MeshKey& key, const std::vector<std::size_t>& cameras);
   void forget(const MeshKey& key);  // a mesh takes tens of megabytes
   void forget_lit_meshes();
 

@@ -13,7 +13,8 @@ constexpr double kLeastShare = 0.98;  // of the bytes asked for
 constexpr double kNear = 0.99;        // where the search for a quality may stop
 constexpr double kFastNear = 0.9;
 constexpr int kFastTries = 3;
-constexpr double kMiddle = 50;  // the level at which qualities stay
+constexpr double kLikelyPart = 0.7;  // of the package's bytes of a source: a file of it is worth a try
+constexpr double kMiddle = 50;       // the level at which qualities stay
 
 bool is_lossy(const ImagePlan& plan) { return plan.coding.format != FileImage::kPng; }
 
@@ -85,7 +86,8 @@ void Filling::encode(Draft& draft, const std::vector<std::size_t>& images) const
       const ImagePlan& plan = draft.plans[images[k]];
       FileImageData& file = draft.files[images[k]];
       if (!file.bytes.empty() && draft.coded[images[k]] == plan) continue;
-      file = candidates_.encoded(images[k], draft.pixels[images[k]], plan.coding, plan.quality, false);
+      file = candidates_.encoded(images[k], draft.pixels[images[k]], plan.coding, plan.quality,
+                                 reference_.wishes.fast());
       draft.coded[images[k]] = plan;
     }
   });
@@ -157,8 +159,8 @@ void Filling::by_source(const MeshFile& mesh, const DealtBytes& allocation, Draf
     const auto stored = candidates_.stored_bytes(i);
     const double others =
         static_cast<double>(best.glb.size()) - static_cast<double>(draft.files[i].bytes.size());
-    // What nobody sees takes next to nothing in the file, so half of the package's bytes is a chance.
-    if (!stored || draft.plans[i].is_source() || others + 0.5 * *stored > static_cast<double>(bytes_))
+    // What nobody sees takes next to nothing in the file.
+    if (!stored || draft.plans[i].is_source() || others + kLikelyPart * *stored > static_cast<double>(bytes_))
       continue;
     Draft other = draft;
     other.plans[i] = {{FileImage::kJpeg, false, true}, 1, kHighestQuality};

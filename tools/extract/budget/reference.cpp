@@ -152,13 +152,17 @@ double LitMeter::difference(const LitViews& views, const std::vector<RenderTextu
                             const RunContext& context) const {
   std::vector<double> parts(reference_.size());
   parallel_for(context, parts.size(), 1, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t v = begin; v < end; ++v)
-      parts[v] =
-          flip_of(reference_[v], prepare_flip(views.picture(v, textures, environment_, serial(context))));
+    for (std::size_t v = begin; v < end; ++v) parts[v] = part(v, views, v, textures, serial(context));
   });
   double sum = 0;
-  for (std::size_t v = 0; v < parts.size(); ++v) sum += weights_[v] * parts[v];
+  for (const double p : parts) sum += p;
   return sum;
+}
+
+double LitMeter::part(std::size_t view, const LitViews& views, std::size_t made,
+                      const std::vector<RenderTexture>& textures, const RunContext& context) const {
+  const Picture picture = views.picture(made, textures, environment_, context);
+  return weights_[view] * flip_of(reference_[view], prepare_flip(picture));
 }
 
 std::vector<double> LitMeter::differences(const LitViews& views, const std::vector<RenderTexture>& textures,

@@ -1,4 +1,5 @@
 #pragma once
+#include <algorithm>
 
 #include <mutex>
 
@@ -66,6 +67,14 @@ class LitMeter {
   /// 0 = equal. `views` are of the same cameras. Same bits for any number of threads.
   double difference(const LitViews& views, const std::vector<RenderTexture>& textures,
                     const RunContext& context) const;
+  /// What a view adds to difference(); `made` is its place in `views`.
+  double part(std::size_t view, const LitViews& views, std::size_t made,
+              const std::vector<RenderTexture>& textures, const RunContext& context) const;
+  std::size_t count() const { return weights_.size(); }
+  /// The view that shows most of the object.
+  std::size_t fullest() const {
+    return static_cast<std::size_t>(std::ranges::max_element(weights_) - weights_.begin());
+  }
   /// The same of each of several changes of the textures, all pictures of a view at once.
   std::vector<double> differences(const LitViews& views, const std::vector<RenderTexture>& textures,
                                   std::vector<OtherTextures>&& changes, const RunContext& context) const;

@@ -4,6 +4,7 @@
 #include "format/rules/proxy_choice.h"
 #include "pipeline/about/gltf_about.h"
 #include "pipeline/io/file_resolver.h"
+#include "stages/base/float_math.h"
 #include "stages/condition/condition.h"
 #include "stages/image/decode_image.h"
 #include "stages/simplification/simplification.h"
@@ -100,12 +101,12 @@ void use_means(Json& material, const Pixels& data) {
 
 /// Colours under half of the occlusion that the first channel of `data` is.
 Pixels occluded(Pixels colours, const Pixels& data) {
+  static const SrgbEncoder<float, false> encode;
   for (std::size_t i = 0; i < std::size_t{colours.width_px} * colours.height_px; ++i) {
     const float occlusion = static_cast<float>(data.data[i * data.channels]) / 255;
     for (std::size_t k = 0; k < 3; ++k) {
       std::uint8_t& code = colours.data[i * colours.channels + k];
-      const float light = light_of_bytes()[code] * (1 - kOcclusionInColour * (1 - occlusion));
-      code = static_cast<std::uint8_t>(srgb_of_light(static_cast<double>(light)) * 255 + 0.5);
+      code = encode(light_of_bytes()[code] * (1 - kOcclusionInColour * (1 - occlusion)));
     }
   }
   return colours;
@@ -319,6 +320,9 @@ constexpr int kQualityTries = 10, kQuickTries = 4;
 constexpr double kNearlyAll = 0.99, kRoughly = 0.96;
 constexpr double kTableErrs = 1.15;     // times what the package tells of a proxy's difference, at most
 constexpr double kSmallerLoses = 0.35;  // a file of half the bytes differs 2 to this power times as much
+constexpr double kWorthATry = 1.3;      // times the difference of the best, by tables
+constexpr double kGoesOn = 1.15;        // the same of the first file, in windows
+constexpr double kAlike = 1.1;          // times as many triangles
 constexpr std::uint64_t kFewBytesOfProxy = 50000;  // two proxies are made smaller, else one
 constexpr std::uint64_t kFarBelow = 4;             // times as many bytes look better without a proxy
 
@@ -346,11 +350,16 @@ class ProxySearch {
     const auto fitting = static_cast<std::uint32_t>(
         std::ranges::count_if(proxies, [&](const ManifestProxy& p) { return p.glb.bytes <= bytes_; }));
     int made_smaller = 0;
+    bool hopeful = false;
     for (std::uint32_t i = 0; i < proxies.size(); ++i) {
       const std::uint32_t k = i < fitting ? fitting - 1 - i : i;
       const bool best = reference_.wishes.best();
-      if (!best && (kFarBelow * proxies[k].glb.bytes < bytes_ || !may_look_better(k) ||
-                    made_smaller == (bytes_ < kFewBytesOfProxy ? 2 : 1)))
+      if (!best && kFarBelow * proxies[k].glb.bytes < bytes_) continue;
+      hopeful = (k >= fitting && hopeful) || best || may_look_better(k);
+      if (!best && k >= fitting && k + 1 < proxies.size() &&
+          static_cast<double>(proxies[k + 1].triangles) <= kAlike * static_cast<double>(proxies[k].triangles))
+        continue;  // the next one has as good a mesh, and finer pictures
+      if (!std::exchange(hopeful, false) || (!best && made_smaller == (bytes_ < kFewBytesOfProxy ? 2 : 1)))
         continue;
       Extracted whole = extract_proxy(reference_.package, {k}, reference_.place, reference_.context, bytes_);
       const bool is_file = fits(whole) && is_wanted_kind(k);
@@ -396,7 +405,7 @@ class ProxySearch {
                          static_cast<double>(bytes_);
     const double likely =
         table_flip(proxy) * (times > 1 ? portable::pow(times, kSmallerLoses) : 1 / kTableErrs);
-    return !fits(best_) || likely < best_.difference;
+    return !fits(best_) || likely < (times > 1 ? kWorthATry : 1) * best_.difference;
   }
 
   void measure_whole(std::uint32_t proxy, Extracted& file) {
@@ -455,12 +464,14 @@ class ProxySearch {
         ProxyParts::read(reference_.package.proxy_glb(proxy), proxy_path(proxy), reference_.context);
     if (!parts) return;
     files_.clear();
+    maps_.clear();
     ProxyTrial trial = first_trial(*parts, whole);
     const bool best = reference_.wishes.best();
     Extracted file = whole;
     while (!make(*parts, trial, file, best) && trial.share * kShareStep > kLeastProxyShare)
       trial.share *= kShareStep;
     if (reference_.wishes.fast()) return offer(std::move(file));
+    if (!best && fits(best_) && file.difference > kGoesOn * best_.difference) return;
     std::vector<ProxyTrial> seen{trial};
     const auto try_next = [&](const ProxyTrial& next) {
       if (std::ranges::find(seen, next) != seen.end()) return false;
@@ -472,6 +483,12 @@ class ProxySearch {
       trial = next;
       return true;
     };
+    const auto try_jpeg = [&] {
+      ProxyTrial jpeg = trial;
+      jpeg.format = FileImage::kJpeg;
+      if (reference_.wishes.images == ExtractImages::kAuto) try_next(jpeg);
+    };
+    if (!best) try_jpeg();
     for (bool again = true; again;) {
       again = false;
       for (const ProxyTrial& next : other_maps(*parts, trial)) again |= try_next(next);
@@ -490,11 +507,7 @@ class ProxySearch {
       for (const int bits : {trial.bits - 1, trial.bits + 1})
         if (bits >= 0 && bits <= kFinestBits) again |= try_with(&ProxyTrial::bits, bits);
     }
-    if (best && reference_.wishes.images == ExtractImages::kAuto) {
-      ProxyTrial jpeg = trial;
-      jpeg.format = FileImage::kJpeg;
-      try_next(jpeg);
-    }
+    if (best) try_jpeg();
     if (!best && fits(file)) {
       Extracted looked_at = file;
       make(*parts, trial, looked_at, true);
@@ -527,6 +540,19 @@ class ProxySearch {
         .first->second;
   }
 
+  /// No JPEG has alpha.
+  FileImage with_alpha(FileImage format) const {
+    if (format != FileImage::kJpeg) return format;
+    return reference_.wishes.images == ExtractImages::kJpeg ? FileImage::kPng : FileImage::kWebp;
+  }
+
+  const std::vector<ProxyMap>& maps_of(const ProxyParts& parts, const ProxyTrial& trial) {
+    const auto [known, fresh] = maps_.try_emplace({trial.maps.data, trial.maps.normal, trial.share});
+    if (fresh)
+      for (ProxyMap& map : known->second = parts.maps(trial.maps)) map.pixels = smaller_map(map, trial.share);
+    return known->second;
+  }
+
   static double quality_of(const ProxyMap& map, double quality) {
     if (map.use == ProxyMap::Use::kNormal) quality += kNormalQualityAbove;
     if (map.use == ProxyMap::Use::kData) quality -= kDataQualityBelow;
@@ -543,9 +569,7 @@ class ProxySearch {
     Pictures out;
     for (const ProxyMap& map : maps) {
       const auto k = static_cast<std::uint32_t>(out.rows.size());
-      const FileImage format = map.pixels.channels < 4                            ? trial.format
-                               : reference_.wishes.images == ExtractImages::kJpeg ? FileImage::kPng
-                                                                                  : trial.format;
+      const FileImage format = map.pixels.channels < 4 ? trial.format : with_alpha(trial.format);
       const double q = quality_of(map, quality);
       const bool numbers = map.averaging() != Averaging::kLight;
       out.files[k] = {format, encode_image(map.pixels, {format, q, numbers, quick, true})};
@@ -561,8 +585,7 @@ class ProxySearch {
     StandaloneGlb draft = coded(parts, trial), whole = draft;
     whole.place(reference_.place);
     whole.set_about(reserved_about(reference_.package.about(), reference_.place, bytes_));
-    std::vector<ProxyMap> maps = parts.maps(trial.maps);
-    for (ProxyMap& map : maps) map.pixels = smaller_map(map, trial.share);
+    const std::vector<ProxyMap>& maps = maps_of(parts, trial);
     double texels = 1;
     for (const ProxyMap& map : maps)
       texels += static_cast<double>(map.pixels.width_px) * map.pixels.height_px;
@@ -598,7 +621,9 @@ class ProxySearch {
   std::map<std::uint32_t, double>& whole_;
   Extracted& best_;
   double known_quality_ = 50, known_texels_ = 0;  // of the last file that was looked at in windows
-  std::map<std::tuple<bool, bool, std::size_t, int>, StandaloneGlb> files_;  // of one proxy: maps, mesh, bits
+  // Of one proxy:
+  std::map<std::tuple<bool, bool, std::size_t, int>, StandaloneGlb> files_;  // by maps, mesh, bits
+  std::map<std::tuple<bool, bool, double>, std::vector<ProxyMap>> maps_;     // by maps, share
 };
 
 }  // namespace

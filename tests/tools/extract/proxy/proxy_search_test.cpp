@@ -6,6 +6,7 @@
 #include <functional>
 
 #include "stages/gltf/check_glb.h"
+#include "stages/image/png_writer.h"
 #include "tests/support/packages.h"
 #include "tools/extract/extract.h"
 
@@ -71,6 +72,23 @@ TEST(ProxySearch, ScalesLevelsAndPngsAreNotReplaced) {
   const Extracted jpeg = extract(with, 3000, [](ExtractBudget& r) { r.images = ExtractImages::kJpeg; });
   EXPECT_EQ(jpeg.proxy, 1u);
   for (const ExtractedImage& i : jpeg.images) EXPECT_EQ(i.format, FileImage::kJpeg);
+}
+
+TEST(ProxySearch, ColoursWithAlphaNeverBecomeAJpeg) {
+  testing::PackageParts parts = testing::make_package_parts();
+  testing::add_proxies(parts);
+  Pixels clear{64, 64, 4, {}};
+  for (std::uint32_t i = 0; i < 64 * 64; ++i)
+    for (const std::uint32_t v : {i % 64 * 4, i / 64 * 4, i % 7 * 30, 200u})
+      clear.data.push_back(static_cast<std::uint8_t>(v));
+  for (Bytes& proxy : parts.proxies) {
+    StandaloneGlb file(proxy, "proxy.glb", GlbRules::kStandalone);
+    file.set_images({{0, {FileImage::kPng, write_png(clear)}}});
+    proxy = file.finish();
+  }
+  const Bytes bytes = parts.build();
+  for (const ExtractEffort effort : {ExtractEffort::kUsual, ExtractEffort::kBest})
+    EXPECT_LE(extract(bytes, 2500, [&](ExtractBudget& r) { r.effort = effort; }).glb.size(), 2500u);
 }
 
 TEST(ProxySearch, FilesAreWhereTheSourceIsAndTheSameForAnyThreads) {
