@@ -132,7 +132,7 @@ class BadInputForProxies : public ::testing::TestWithParam<BadInput> {
     const std::string package = folder_ / (mode + ".texmesh");
     const CommandResult made = run_command({TEXMESH_BINARY, "compile", folder_ / "m.glb", "-o", package,
                                             "--no-cache", "-v", "--profile", folder_ / "profile.json",
-                                            "--proxies.mode", mode, "--proxies.sizes", "8000,16000"});
+                                            "--proxies.mode", mode, "--proxies.sizes", "8000,32000"});
     ASSERT_EQ(made.exit_code, 0) << made.output << made.errors;
     std::size_t notes = 0;
     for (std::size_t at = 0; (at = made.output.find("note: no-proxy: ", at)) != std::string::npos; ++at)
