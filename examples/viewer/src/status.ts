@@ -28,10 +28,10 @@ export function showStatus(live: Live, packageUrl: string): void {
 
 const nameInAddress = (): string => new URLSearchParams(location.search).get('title') ?? '';
 
-/** A package's name by its URL, as people would write it. */
+/** A package's name by its URL, as people would write it, without the digest that a site puts behind it. */
 function shortName(url: string): string {
   const name = readable(url.split(/[?#]/)[0] ?? '').replace(/\/$/, '').split('/').pop() ?? '';
-  const words = name.replace(/\.texmesh$/, '').replace(/[-_\s]+/g, ' ').trim();
+  const words = name.replace(/(\.[0-9a-f]{16})?\.texmesh$/, '').replace(/[-_\s]+/g, ' ').trim();
   return words.charAt(0).toUpperCase() + words.slice(1) || 'texmesh';
 }
 
