@@ -13,9 +13,8 @@
 // 5. The file is written and filled up to at least 98 % of the bytes (Filling).
 // 6. Sums of losses are guesses, so in a small file whole pictures decide between few: other sizes of the
 // texture that loses most, a leaner mesh, other shares. One that is plainly worse in a view is not looked at
-// further. With
-// --best many more files are looked at, in a small file those of other likely meshes and codings, too. In a
-// large file textures may be full: then the mesh is finer.
+// further. With --best many more files are looked at, in a small file those of other likely meshes and
+// codings, too. In a large file textures may be full: then the mesh is finer.
 // 7. Last, proxies of the package are tried in its place (offer_proxies()).
 // Where the bytes hold S_0 and all of the source's own images, nothing is looked for (whole_source()).
 #include "tools/extract/budget/budget_search.h"
