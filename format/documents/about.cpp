@@ -76,7 +76,7 @@ void read_coordinates(const JsonAt& at, About& about) {
     about.metres_per_unit = at["unit"]["metres"].number(kLeastMetresPerUnit, kMaxMetresPerUnit);
   }
   if (at.has("upAxis")) {
-    about.up_axis = at["upAxis"].text(1);
+    about.up_axis = at["upAxis"].text(60);
     if (about.up_axis != "x" && about.up_axis != "y" && about.up_axis != "z")
       at["upAxis"].fail("x, y or z", about.up_axis);
   }

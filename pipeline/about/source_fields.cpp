@@ -145,7 +145,7 @@ constexpr Unit kUnits[] = {{1, " m metre meter metres meters "},
                            {1e-2, " cm centimetre centimeter centimetres centimeters "},
                            {1e-1, " dm "},
                            {1e3, " km "},
-                           {1e-6, " um micrometre micrometer "},
+                           {1e-6, " um µm micrometre micrometer "},
                            {0.0254, " in inch inches "},
                            {0.3048, " ft foot feet "},
                            {0.9144, " yd yard yards "}};
@@ -164,6 +164,41 @@ std::string canonical_name(std::string_view name) {
     if (c == '_' || c == '-') c = ' ';
   }
   return out;
+}
+
+/// "; did you mean ...?" by words for a licence: "Creative Commons Attribution 4.0 International" is
+/// CC-BY-4.0, "CC BY-SA" the last of its versions, "GPLv3" GPL-3.0.
+std::string licence_meant(const std::string& text) {
+  static constexpr std::pair<std::string_view, std::string_view> kWords[] = {{"creative commons", "cc"},
+                                                                             {"attribution", "by"},
+                                                                             {"non commercial", "nc"},
+                                                                             {"noncommercial", "nc"},
+                                                                             {"share alike", "sa"},
+                                                                             {"sharealike", "sa"},
+                                                                             {"no derivatives", "nd"},
+                                                                             {"noderivatives", "nd"},
+                                                                             {"noderivs", "nd"},
+                                                                             {"international", ""},
+                                                                             {"unported", ""},
+                                                                             {"license", ""},
+                                                                             {"licence", ""},
+                                                                             {"version", ""},
+                                                                             {"public domain", ""}};
+  std::string name = canonical_name(text);
+  for (const auto& [word, letters] : kWords)
+    if (const std::size_t at = name.find(word); at != name.npos) name.replace(at, word.size(), letters);
+  for (std::size_t at = 0; at + 1 < name.size(); ++at)
+    if (name[at] == 'v' && name[at + 1] >= '0' && name[at + 1] <= '9') name[at] = ' ';
+  for (std::size_t at; (at = name.find("  ")) != name.npos;) name.erase(at, 1);
+  name = canonical_name(name);
+  if ((name + " ").starts_with("by ")) name = "cc " + name;
+  const std::span licences(kSpdxLicences, kSpdxLicenceCount);
+  for (std::size_t k = name.empty() ? 0 : licences.size(); k-- > 0;) {
+    const std::string listed = canonical_name(licences[k]);
+    if (listed.starts_with(name) && listed.find_first_not_of(" .0123456789", name.size()) == listed.npos)
+      return "; did you mean " + std::string(licences[k]) + "?";
+  }
+  return meant_instead(text, licences);
 }
 
 void set_epsg(About& about, const std::string& value, const std::string& place, Notes& notes) {
@@ -243,6 +278,8 @@ class MetaReader {
          "identifiers", "capture", "dates", "unit", "upAxis", "coordinateReference", "extras"});
     json.erase("$schema");
     check_nested(json);
+    if (json.contains("upAxis") && json["upAxis"].is_string())
+      for (char& c : json["upAxis"].get_ref<std::string&>()) c = lower_letter(c);
     replace_unit(json);
     check_licence(json);
     check_epsg(json);
@@ -256,11 +293,9 @@ class MetaReader {
 
  private:
   void check_names(const Json& object, const std::string& at,
-                   std::initializer_list<std::string_view> known) const {
+                   std::initializer_list<const char*> known) const {
     if (!object.is_object()) fail(at, "an object", object.type_name());
-    for (const auto& [name, value] : object.items())
-      if (std::find(known.begin(), known.end(), name) == known.end())
-        fail(at + "/" + name, "a known field", "\"" + name + "\"");
+    texmesh::check_names(object, known, RecordPlace{file_, nullptr, place_ + at});
   }
 
   void check_list(const Json& json, const char* name, const char* kind, const char* text) const {
@@ -291,11 +326,11 @@ class MetaReader {
     if (!json.contains("licence") || !json["licence"].is_string()) return;
     const Licence licence = read_licence(json["licence"].get<std::string>());
     if (licence.kind == Licence::Kind::kOther)
-      fail("/licence", "an SPDX licence expression or an http or https URL",
+      fail("/licence", "an SPDX licence (LicenseRef-NAME for terms of your own) or an http or https URL",
            (licence.wrong.empty() || licence.wrong == licence.text
                 ? "\"" + licence.text + "\""
                 : "\"" + licence.wrong + "\" in \"" + licence.text + "\"") +
-               meant_instead(licence.text, {kSpdxLicences, kSpdxLicenceCount}));
+               licence_meant(licence.text));
     json["licence"] = licence.text;
     if (!json.contains("licenceUrl") && !licence.url.empty()) json["licenceUrl"] = licence.url;
   }

@@ -231,11 +231,9 @@ class CollectionReader {
   }
 
   void check_members(const Json& object, const std::string& place,
-                     std::initializer_list<std::string_view> known) const {
+                     std::initializer_list<const char*> known) const {
     if (!object.is_object()) fail(place, "an object", object.type_name());
-    for (const auto& [name, value] : object.items())
-      if (std::find(known.begin(), known.end(), name) == known.end())
-        fail(place + "/" + name, "a known field", "\"" + name + "\"");
+    check_names(object, known, RecordPlace{file_, nullptr, place});
   }
 
   std::string path_at(const Json& object, const char* key, const std::string& place) const {

@@ -1,6 +1,8 @@
 // Options as generic code sees them: listed from the fields of their structs, as JSON both ways, as schema.
 #include "pipeline/compile/options.h"
 
+#include <fmt/ranges.h>
+
 #include <filesystem>
 #include <nlohmann/json.hpp>
 #include <sstream>
@@ -274,7 +276,13 @@ void apply_profile(CompileOptions& options, const Json& root, const std::string&
     for (const auto& [name, value] : section.items()) {
       const std::string place = "/" + stage + "/" + name;
       OptionField* field = find_option(fields, stage + "." + name);
-      if (!field) throw InputError(file_name, place, "an option of " + stage, "\"" + name + "\"");
+      if (!field) {
+        std::vector<std::string> names;
+        for (const OptionField& f : fields)
+          if (f.stage == stage) names.push_back(f.name);
+        throw InputError(file_name, place, "an option of " + stage,
+                         "\"" + name + "\"" + meant_instead(name, names));
+      }
       set_option_json(*field, value, file_name, place);
     }
   }
@@ -294,10 +302,8 @@ std::string profile_file(const std::string& wanted) {
       if (entry.path().extension() == ".json") names.push_back(entry.path().stem().string());
   }
   std::sort(names.begin(), names.end());
-  std::string known;
-  for (const std::string& name : names) known += (known.empty() ? "" : ", ") + name;
-  throw InputError(wanted, "", "a file, or the name of a profile that is installed",
-                   known.empty() ? "none" : known);
+  throw InputError("--profile", "", fmt::format("a file, or one of {}", fmt::join(names, ", ")),
+                   wanted + meant_instead(wanted, names));
 }
 
 std::string write_profile(const CompileOptions& options) {

@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "format/base/bounded_json.h"
+#include "pipeline/io/names/closest_word.h"
 #include "pipeline/io/uri.h"
 
 namespace texmesh {
@@ -33,11 +34,17 @@ std::vector<std::string> words_in(const char* words) {
   return list;
 }
 
+std::string shown_json(const Json& found) {
+  return found.dump(-1, ' ', false, Json::error_handler_t::replace).substr(0, kMostShownBytes);
+}
+
 template <class Words>
-std::string one_of(const Words& words) {
+[[noreturn]] void fail_choice(const Words& words, const Json& found, const RecordPlace& at) {
   std::string text;
   for (const auto& word : words) text += (text.empty() ? "one of " : ", ") + std::string(word);
-  return text;
+  throw InputError(
+      at.file, at.pointer(), text,
+      shown_json(found) + (found.is_string() ? meant_instead(found.get<std::string>(), words) : ""));
 }
 
 /// Bounds are numbers of the schema's own type: 1, not 1.0.
@@ -53,8 +60,7 @@ std::string RecordPlace::pointer() const {
 }
 
 void RecordPlace::fail(const std::string& expected, const Json& found) const {
-  throw InputError(file, pointer(), expected,
-                   found.dump(-1, ' ', false, Json::error_handler_t::replace).substr(0, kMostShownBytes));
+  throw InputError(file, pointer(), expected, shown_json(found));
 }
 
 Json& member_of(Json& object, std::string_view name) { return object[std::string(name)]; }
@@ -121,7 +127,7 @@ void get_json(const Json& from, std::string& value, const FieldRule& rule, const
   if (rule.names_file) value = from_wire(value);
   if (!rule.words) return;
   const std::vector<std::string> words = words_in(rule.words);
-  if (std::find(words.begin(), words.end(), value) == words.end()) at.fail(one_of(words), from);
+  if (std::find(words.begin(), words.end(), value) == words.end()) fail_choice(words, from, at);
 }
 
 void get_json(const Json& from, Sha256& value, const RecordPlace& at) {
@@ -133,7 +139,7 @@ void get_json(const Json& from, Json& value) { value = from; }
 std::size_t get_enum(const Json& from, std::span<const std::string_view> names, const RecordPlace& at) {
   const std::string* const text = from.get_ptr<const std::string*>();
   const auto found = text ? std::find(names.begin(), names.end(), *text) : names.end();
-  if (found == names.end()) at.fail(one_of(names), from);
+  if (found == names.end()) fail_choice(names, from, at);
   return static_cast<std::size_t>(found - names.begin());
 }
 
@@ -146,7 +152,8 @@ void check_constant(const Json& from, const Constant& value, const RecordPlace& 
 void check_names(const Json& object, const std::vector<const char*>& known, const RecordPlace& at) {
   for (const auto& [name, value] : object.items())
     if (std::find(known.begin(), known.end(), name) == known.end())
-      throw InputError(at.file, at.pointer() + "/" + name, "a known field", "\"" + name.substr(0, 60) + "\"");
+      throw InputError(at.file, at.pointer() + "/" + name, "a known field",
+                       "\"" + name.substr(0, 60) + "\"" + meant_instead(name, known));
 }
 
 std::size_t size_of_list(const Json& from, const FieldRule& rule, const RecordPlace& at) {

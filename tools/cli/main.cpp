@@ -51,7 +51,11 @@ void add_commands(Command& program, const std::string& first_word) {
 
 int main(int argc, char** argv) {
   using namespace texmesh;
-  const std::string first_word = argc > 1 ? argv[1] : "";
+  std::vector<char*> words(argv, argv + argc);
+  static char help[] = "--help", version[] = "--version";
+  if (argc > 1 && argv[1] == std::string("help")) words.erase(words.begin() + 1), words.push_back(help);
+  if (argc > 1 && argv[1] == std::string("version")) words[1] = version;
+  const std::string first_word = words.size() > 1 ? words[1] : "";
   if (argc == 2 && first_word == "worker") return worker_main();
   if (argc == 2 && first_word == "worker-origin") return worker_origin_main();
   serve_workers();
@@ -68,5 +72,5 @@ int main(int argc, char** argv) {
       "  texmesh view scan.texmesh                    look at the package in a browser");
   program.notes("Every command explains itself: texmesh compile --help");
   add_commands(program, first_word);
-  return line.run(argc, argv);
+  return line.run(static_cast<int>(words.size()), words.data());
 }

@@ -1,7 +1,6 @@
 #include "pipeline/io/names/closest_word.h"
 
 #include <algorithm>
-#include <vector>
 
 namespace texmesh {
 namespace {
@@ -43,12 +42,11 @@ std::string_view closest_word(std::string_view written, std::span<const std::str
     const std::size_t d = distance(letters, letters_of(word));
     if (d < least && d < word.size()) least = d, closest = word;
   }
+  const auto begins = [&](std::string_view word) { return letters_of(word).starts_with(letters); };
+  if (const auto longer = std::ranges::find_if(words, begins);
+      closest.empty() && letters.size() >= 3 && longer != words.end())
+    closest = *longer;
   return closest;
-}
-
-std::string meant_instead(std::string_view written, std::span<const std::string_view> words) {
-  const std::string_view closest = closest_word(written, words);
-  return closest.empty() ? "" : "; did you mean " + std::string(closest) + "?";
 }
 
 }  // namespace texmesh

@@ -47,6 +47,35 @@ TEST(Meta, NamesTheFieldThatIsWrong) {
   EXPECT_NE(place_of("\"" + std::string(300000, 'x') + "\""), "no error");
 }
 
+TEST(Meta, SaysWhatMayHaveBeenMeant) {
+  const auto told = [](const std::string& json) -> std::string {
+    try {
+      return read_meta(json, "m.json");
+    } catch (const InputError& e) {
+      return e.what();
+    }
+  };
+  const std::pair<const char*, const char*> licences[] = {
+      {"CC BY 4.0", "CC-BY-4.0"},
+      {"Creative Commons Attribution 4.0 International", "CC-BY-4.0"},
+      {"CC BY-SA", "CC-BY-SA-4.0"},
+      {"Attribution-NonCommercial 3.0", "CC-BY-NC-3.0"},
+      {"CC-BY 4", "CC-BY-4.0"},
+      {"CC0", "CC0-1.0"},
+      {"GPLv3", "GPL-3.0"},
+      {"ODbL", "ODbL-1.0"},
+      {"Apache License 2", "Apache-2.0"}};
+  for (const auto& [written, meant] : licences)
+    EXPECT_NE(told(R"({"licence":")" + std::string(written) + "\"}")
+                  .find("did you mean " + std::string(meant) + "?"),
+              std::string::npos)
+        << written;
+  EXPECT_EQ(told(R"({"licence":"All rights reserved"})").find("did you mean"), std::string::npos);
+  EXPECT_NE(told(R"({"license":"MIT"})").find("did you mean licence?"), std::string::npos);
+  EXPECT_NE(told(R"({"upAxis":"up"})").find("x, y or z"), std::string::npos);
+  EXPECT_EQ(told(R"({"upAxis":"Z"})"), R"({"upAxis":"z"})");
+}
+
 TEST(Meta, MergesFieldByField) {
   EXPECT_EQ(merge_meta("", ""), "");
   EXPECT_EQ(merge_meta(R"({"title":"A","unit":"mm"})", R"({"title":"B"})"),

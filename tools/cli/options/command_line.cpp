@@ -435,12 +435,9 @@ std::string first_unknown(const CLI::App& app, bool option) {
   return "";
 }
 
-std::string with_suggestion(const std::string& written, const Words& words) {
-  return written + meant_instead(written, std::vector<std::string_view>(words.begin(), words.end()));
-}
-
-/// What a word that means nothing here may have been meant for; "" where CLI11 says enough.
+/// What is wrong, with what a word that means nothing here may have been meant for; "" where nothing is.
 std::string refusal(const CLI::App& program, const CLI::ParseError& e) {
+  if (e.get_exit_code() == 0) return "";
   const CLI::App* app = &program;
   std::string path = program.get_name();
   for (; !app->get_subcommands().empty(); path += " " + app->get_name()) app = app->get_subcommands().back();
@@ -452,16 +449,22 @@ std::string refusal(const CLI::App& program, const CLI::ParseError& e) {
     const std::string written = first_unknown(*app, false);
     return path +
            (written.empty() ? ": a command is missing"
-                            : ": there is no command " + with_suggestion(written, names)) +
+                            : ": there is no command " + written + meant_instead(written, names)) +
            " (" + path + " --help lists the commands)";
   }
-  if (e.get_name() != "ExtrasError" && !any_option) return "";
+  if (e.get_name() != "ExtrasError" && !any_option)
+    return path + ": " + e.what() + " (" + path + " --help tells more)";
   if (!any_option) return path + ": expected no further argument, found " + first_unknown(*app, false);
   Words names;
   for (const CLI::Option* o : app->get_options())
     for (const std::string& name : option_words(*o)) names.push_back(name);
-  return path + ": there is no option " + with_suggestion(first_unknown(*app, true), names) + " (" + path +
-         " --help lists the options)";
+  const std::string name = first_unknown(*app, true), meant = meant_instead(name, names);
+  return path + ": there is no option " + name + meant + " (" + path + " --help lists the options)";
+}
+
+/// A script's variable that was never set would else count as an option that was not given.
+std::string empty_fault(const std::string& text) {
+  return text.empty() ? "expected a value, found an empty text" : "";
 }
 
 template <class T>
@@ -520,7 +523,7 @@ Option& Option::remembers_default(const std::string& text) {
 }
 
 Option& Option::one_of_explained(const std::vector<std::string>& words) {
-  option_->check(CLI::IsMember(words, CLI::ignore_case).description(""));
+  option_->transform(CLI::Validator([words](std::string& w) { return choice_fault(w, words); }, ""));
   return offers(words);
 }
 
@@ -571,25 +574,25 @@ std::string Command::shell_text(const std::string& form) const {
                          : manual_page(*app_, state_->help);
 }
 
-Option Command::flag(const std::string& names, bool& value, const std::string& help) {
-  CLI::Option* option = app_->add_flag(names, value, help);
+Option Command::grouped(CLI::Option* option) {
   if (!group_.empty()) option->group(group_);
   return {option, *state_};
 }
 
+Option Command::flag(const std::string& names, bool& value, const std::string& help) {
+  return grouped(app_->add_flag(names, value, help));
+}
+
 Option Command::flag(const std::string& names, std::function<void()> on_given, const std::string& help) {
-  CLI::Option* option = app_->add_flag_callback(names, std::move(on_given), help);
-  if (!group_.empty()) option->group(group_);
-  return {option, *state_};
+  return grouped(app_->add_flag_callback(names, std::move(on_given), help));
 }
 
 template <class T>
 Option Command::option(const std::string& names, T& value, const std::string& help,
                        const std::string& value_name) {
   CLI::Option* option = app_->add_option(names, value, help);
-  option->type_name(value_name.empty() ? default_value_name<T>() : value_name);
-  if (!group_.empty()) option->group(group_);
-  return {option, *state_};
+  if constexpr (std::is_same_v<T, std::string>) option->check(empty_fault);
+  return grouped(option->type_name(value_name.empty() ? default_value_name<T>() : value_name));
 }
 template Option Command::option(const std::string&, int&, const std::string&, const std::string&);
 template Option Command::option(const std::string&, std::uint64_t&, const std::string&, const std::string&);
@@ -607,8 +610,7 @@ template Option Command::option(const std::string&, std::vector<std::string>&, c
 Option Command::option(const std::string& names, std::function<void(const std::string&)> on_given,
                        const std::string& help, const std::string& value_name) {
   CLI::Option* option = app_->add_option_function<std::string>(names, std::move(on_given), help);
-  if (!group_.empty()) option->group(group_);
-  return {option->type_name(value_name), *state_};
+  return grouped(option->check(empty_fault)->type_name(value_name));
 }
 
 void Command::help_option(const std::string& name, const std::string& prefix, const std::string& help) {
@@ -684,9 +686,9 @@ int CommandLine::parse_and_run(int argc, char** argv) {
     app_->parse(argc, argv);
   } catch (const CLI::ParseError& e) {
     const std::string text = refusal(*app_, e);
-    if (text.empty()) return app_->exit(e) == 0 ? kExitOk : kExitUsage;
-    std::cerr << text << '\n';
-    return kExitUsage;
+    if (!text.empty()) return std::cerr << text << '\n', kExitUsage;
+    app_->exit(e);
+    return kExitOk;
   }
   return state_->exit_code;
 }

@@ -121,6 +121,7 @@ class Command {
   void on_run(std::function<int()> run);
 
  private:
+  Option grouped(CLI::Option* option);
   template <class Enum, class Value>
   Option choice_of(const std::string& names, Value& value, const std::string& help,
                    const std::string& value_name) {

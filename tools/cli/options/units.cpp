@@ -1,10 +1,22 @@
 #include "tools/cli/options/units.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
 #include <map>
+
+#include "pipeline/io/names/closest_word.h"
 
 namespace texmesh {
 namespace {
+
+char lower_letter(char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; }
+
+std::string in_lower_case(std::string text) {
+  std::ranges::transform(text, text.begin(), lower_letter);
+  return text;
+}
 
 constexpr double kMostBytes = 1e18, kMost_s = 1e6, kMostRate = 1e12;
 
@@ -38,6 +50,15 @@ std::string number_fault(const std::string& text, double least, double most) {
   return fmt::format("expected a number from {:g} to {:g}, found {}", least, most, text);
 }
 
+std::string choice_fault(std::string& word, const std::vector<std::string>& words) {
+  const auto found = std::ranges::find(words, in_lower_case(word), in_lower_case);
+  if (found == words.end())
+    return fmt::format("expected one of {}, found {}{}", fmt::join(words, ", "), word,
+                       meant_instead(word, words));
+  word = *found;
+  return "";
+}
+
 std::uint64_t parse_bytes(const std::string& text, const std::string& flag) {
   static const std::map<std::string, double> kUnits{{"", 1},
                                                     {"b", 1},
@@ -53,10 +74,8 @@ std::uint64_t parse_bytes(const std::string& text, const std::string& flag) {
                                                     {"mib", 1048576.0},
                                                     {"gib", 1073741824.0},
                                                     {"tib", 1099511627776.0}};
-  std::string lower = text;  // nobody means bits by the size of a file
-  for (char& c : lower) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
-  try {
-    return static_cast<std::uint64_t>(parse(lower, flag, kUnits, "", kMostBytes));
+  try {  // nobody means bits by the size of a file
+    return static_cast<std::uint64_t>(parse(in_lower_case(text), flag, kUnits, "", kMostBytes));
   } catch (const UsageError&) {
     throw UsageError(flag, "", "a size such as 500kB, 500MB or 8GiB", text);
   }
@@ -75,20 +94,25 @@ std::int64_t parse_seconds(const std::string& text, const std::string& flag) {
 }
 
 double parse_duration(const std::string& text, const std::string& flag) {
-  static const std::map<std::string, double> kUnits{{"", 1}, {"s", 1}, {"ms", 1e-3}, {"min", 60}};
+  static const std::map<std::string, double> kUnits{{"", 1}, {"s", 1}, {"sec", 1}, {"ms", 1e-3}, {"min", 60}};
   return parse(text, flag, kUnits, "a time such as 4, 1.5s or 250ms, at most 1e6 s", kMost_s);
 }
 
 double parse_bandwidth(const std::string& text, const std::string& flag) {
   static const std::map<std::string, double> kUnits{
       {"B/s", 1},         {"kB/s", 1e3},       {"MB/s", 1e6},       {"GB/s", 1e9},      {"KiB/s", 1024},
-      {"kbit", 1e3 / 8},  {"Mbit", 1e6 / 8},   {"Gbit", 1e9 / 8},   {"kbps", 1e3 / 8},  {"Mbps", 1e6 / 8},
+      {"kbit", 1e3 / 8},  {"mbit", 1e6 / 8},   {"gbit", 1e9 / 8},   {"kbps", 1e3 / 8},  {"Mbps", 1e6 / 8},
       {"Gbps", 1e9 / 8},  {"kb/s", 1e3 / 8},   {"Mb/s", 1e6 / 8},   {"Gb/s", 1e9 / 8},  {"MiB/s", 1048576},
-      {"bit/s", 1 / 8.0}, {"kbit/s", 1e3 / 8}, {"Mbit/s", 1e6 / 8}, {"Gbit/s", 1e9 / 8}};
-  const double v =
-      parse(text, flag, kUnits, "a rate such as 2Mbit/s or 41.68kB/s, at most 1e12 B/s", kMostRate);
-  if (!(v > 0)) throw UsageError(flag, "", "a rate above 0", text);
-  return v;
+      {"bit/s", 1 / 8.0}, {"kbit/s", 1e3 / 8}, {"mbit/s", 1e6 / 8}, {"gbit/s", 1e9 / 8}};
+  const std::string lower = in_lower_case(text);
+  try {
+    const bool bits = lower.find("bit") != lower.npos;  // of which nobody means thousandths
+    const double v = parse(bits ? lower : text, flag, kUnits, "", kMostRate);
+    if (v > 0) return v;
+  } catch (const UsageError&) {
+    throw UsageError(flag, "", "a rate such as 2Mbit/s or 41.68kB/s, at most 1e12 B/s", text);
+  }
+  throw UsageError(flag, "", "a rate above 0", text);
 }
 
 }  // namespace texmesh

@@ -1,5 +1,6 @@
 #pragma once
 #include <cstdint>
+#include <vector>
 
 #include "format/base/errors.h"
 
@@ -23,6 +24,9 @@ auto as_usage(const Run& run) {
 /// "" for the text of a number from `least` to `most`, which NaN is not (CLI::Range lets it pass); else what
 /// is wrong.
 std::string number_fault(const std::string& text, double least, double most);
+
+/// Gives a word the spelling of the list, which has it in any case; "", or what is wrong.
+std::string choice_fault(std::string& word, const std::vector<std::string>& words);
 
 /// "500MB", "8GiB", "1234". UsageError that names the flag.
 std::uint64_t parse_bytes(const std::string& text, const std::string& flag);

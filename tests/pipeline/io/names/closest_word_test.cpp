@@ -16,6 +16,7 @@ TEST(ClosestWord, FindsWhatHasFewOtherLetters) {
   EXPECT_EQ(closest("CC BY 4.0"), "CC-BY-4.0");
   EXPECT_EQ(closest("cc0 1.0"), "CC0-1.0");
   EXPECT_EQ(closest("--tilte"), "--title");
+  EXPECT_EQ(closest("com"), "compile") << "its beginning";
 }
 
 TEST(ClosestWord, FindsNothingInOtherWords) {

@@ -27,7 +27,16 @@ TEST(Forgiving, AWordThatMeansNothingIsNamedWithOneThatDoes) {
   expect_told({"cache", "stats"}, 2, "texmesh cache: there is no command stats; did you mean stat?");
   expect_told({"compile", "a.obj", "-o", "b", "--tilte=x"}, 2,
               "texmesh compile: there is no option --tilte; did you mean --title?");
+  expect_told({"site", "a", "--out", "b"}, 2, "there is no option --out; did you mean --output?");
   expect_told({"compile", "a.obj", "-o", "b", "--up", "W"}, 2, "--up: expected one of");
+  expect_told({"compile", "a.obj", "-o", "b", "--atlas", "rebuilt"}, 2, "; did you mean rebuild?");
+  expect_told({"compile", "a.obj", "-o", "b", "--profile", "smal"}, 2, "; did you mean small?");
+  expect_told({"dump", "a", "scale"}, 2, "texmesh dump: PART: expected one of summary, scales");
+  expect_told({"export", "a", "-o", "b", "--to", "modelviewer"}, 2, "; did you mean model-viewer?");
+  expect_told({"compile", "a.obj"}, 2, "texmesh compile: --output is required (texmesh compile --help");
+  expect_told({"extract", "a", "-o", "b.glb", "--bytes", ""}, 2, "--bytes: expected a value");
+  expect_told({"help", "dump"}, 0, "Usage: texmesh dump");
+  expect_told({"version"}, 0, "package format");
   expect_told({"compile", "a.obj", "-o", "b", "--rungs", "10,120"}, 2,
               "--rungs: /1: expected an integer in 1 .. 100");
 }
@@ -36,7 +45,7 @@ TEST(Forgiving, SizesAndRatesAreReadAsPeopleWriteThem) {
   for (const char* text : {"500kB", "500kb", "500KB", "500k", "500 kB", "0.5 MB", "500000"})
     EXPECT_EQ(parse_bytes(text, "--bytes"), 500'000u) << text;
   EXPECT_EQ(parse_bytes("2mib", "--bytes"), 2u << 20);
-  for (const char* text : {"2Mbit/s", "2Mbps", "2Mbit", "2 Mb/s", "250kB/s"})
+  for (const char* text : {"2Mbit/s", "2Mbps", "2Mbit", "2 Mb/s", "250kB/s", "2mbit", "2 MBIT/S", "2000Kbit"})
     EXPECT_EQ(parse_bandwidth(text, "--bandwidth"), 250'000) << text;
   for (const char* text : {"", "kB", "500 kBB", "-1kB", "5 0kB", "nan", "1e30"})
     EXPECT_THROW(parse_bytes(text, "--bytes"), UsageError) << text;
