@@ -376,8 +376,8 @@ class SplitElementCodec {
   }
   /// `is_pending`: the wedge's values are still to be coded.
   std::uint32_t add_wedge(std::uint32_t point, bool is_pending) {
-    if (mesh.wedge_point().size() >= 3ull * limits_.faces)
-      fail_split_stream("S19", "wedges within the reader's limit", std::to_string(limits_.faces));
+    if (mesh.wedge_point().size() >= limits_.wedges)
+      fail_split_stream("S19", "wedges within the reader's limit", std::to_string(limits_.wedges));
     const std::uint32_t w = mesh.add_wedge(point);
     offered_.push_back(0);
     values.add_wedge(w, is_pending);

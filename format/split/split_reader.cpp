@@ -207,9 +207,12 @@ SplitLimits checked_limits(const SplitStreamHead& head, const SplitLimits& limit
   if (last.points > limits.points)
     fail_split_stream("L09", "points", "at most " + std::to_string(limits.points),
                       std::to_string(last.points));
-  if (last.faces > limits.faces || last.wedges > 3ull * limits.faces)
+  if (last.faces > limits.faces)
     fail_split_stream("L09", "faces", "at most " + std::to_string(limits.faces), std::to_string(last.faces));
-  return {last.points, last.faces};
+  if (last.wedges > limits.wedges)
+    fail_split_stream("L09", "wedges", "at most " + std::to_string(limits.wedges),
+                      std::to_string(last.wedges));
+  return {last.points, last.faces, last.wedges};
 }
 
 }  // namespace

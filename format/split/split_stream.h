@@ -84,7 +84,7 @@ std::uint64_t split_prefix_bytes(const SplitStreamHead& head, int scale);
 
 /// What a reader is willing to hold; a stream that goes beyond is refused.
 struct SplitLimits {
-  std::uint32_t points = 1u << 27, faces = 1u << 28;
+  std::uint32_t points = 1u << 27, faces = 1u << 28, wedges = 3u << 28;
 };
 
 }  // namespace texmesh

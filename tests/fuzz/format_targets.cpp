@@ -162,7 +162,7 @@ Bytes with_digests(ByteSpan input, std::size_t fixed, std::size_t record, std::s
 
 /// Blocks go in part by part, so that their digests do not stand in the way.
 void read_split_stream(ByteSpan input) {
-  constexpr SplitLimits kLimits{20000, 40000};
+  constexpr SplitLimits kLimits{20000, 40000, 120000};
   const SplitStreamHead head = read_split_head(input);
   SplitStreamReader reader(head, kLimits);
   for (const SplitBlock& b : head.blocks) {

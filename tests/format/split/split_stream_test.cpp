@@ -186,9 +186,10 @@ TEST(SplitStream, KeepsToTheReadersLimits) {
   const SplitFixture fixture = split_fixture();
   const SplitStreamHead head = read_split_head(write_split_stream(fixture.source));
   const SplitScale& last = head.scales.back();
-  EXPECT_NO_THROW(SplitStreamReader(head, {last.points, last.faces}));
-  EXPECT_THROW(SplitStreamReader(head, {last.points - 1, last.faces}), FormatError);
-  EXPECT_THROW(SplitStreamReader(head, {last.points, last.faces - 1}), FormatError);
+  EXPECT_NO_THROW(SplitStreamReader(head, {last.points, last.faces, last.wedges}));
+  EXPECT_THROW(SplitStreamReader(head, {last.points - 1, last.faces, last.wedges}), FormatError);
+  EXPECT_THROW(SplitStreamReader(head, {last.points, last.faces - 1, last.wedges}), FormatError);
+  EXPECT_THROW(SplitStreamReader(head, {last.points, last.faces, last.wedges - 1}), FormatError);
 }
 
 /// Sum of squared distances of the points from where they should be, with every third part of positions lost.

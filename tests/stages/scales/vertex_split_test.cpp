@@ -155,7 +155,7 @@ TEST(VertexSplit, MaterialsPartsTwoUvSetsAndColours) {
 }
 
 /// A bumpy sphere of many small charts.
-Mesh many_charts() {
+Mesh many_charts(std::size_t triangles_of_a_chart = 8) {
   const Mesh m = bumpy_sphere(20, 30);
   Mesh charts = m;
   charts.wedge_position.clear(), charts.uv0.clear(), charts.normals.clear();
@@ -163,7 +163,7 @@ Mesh many_charts() {
   for (std::size_t t = 0; t < m.triangles.size(); ++t)
     for (std::size_t k = 0; k < 3; ++k) {
       const std::uint32_t w = m.triangles[t][k];
-      const auto chart = static_cast<std::uint32_t>(t / 8);
+      const auto chart = static_cast<std::uint32_t>(t / triangles_of_a_chart);
       const auto [it, fresh] =
           ids.try_emplace({w, chart}, static_cast<std::uint32_t>(charts.wedge_position.size()));
       if (fresh) {
@@ -198,6 +198,17 @@ Mesh open_book() {
 }
 
 TEST(VertexSplit, ManySmallChartsWithRelaxedJunctions) { expect_stream(simplified(many_charts())); }
+
+/// A split leaves wedges at its parent that no face has any more.
+TEST(VertexSplit, AStreamMayHaveMoreWedgesThanItsFacesHaveCorners) {
+  const NestedScales scales = simplified(many_charts(1));
+  const SplitScale last =
+      read_split_head(write_split_stream(make_vertex_splits(scales, {0, scales.scales.size() - 1},
+                                                            coding_of(scales.mesh), kOneThread)))
+          .scales.back();
+  EXPECT_GT(last.wedges, 3 * last.faces);
+  expect_stream(scales);
+}
 
 TEST(VertexSplit, NonManifoldSpineAndDoubledSheets) {
   const NestedScales scales = simplified(open_book());
