@@ -138,7 +138,11 @@ class FolderStore final : public PackageStore {
   Descriptor open_at(const Descriptor& folder, const std::string& part, int flags,
                      const std::string& path) const {
     Descriptor d(::openat(folder.get(), part.c_str(), O_RDONLY | O_NOFOLLOW | O_CLOEXEC | flags));
-    if (d.get() < 0) throw RuleError("E01", root_, path, "a file", std::strerror(errno));
+    if (d.get() < 0 && errno == ENOENT && path == kManifestPath)
+      throw RuleError("E01", root_, "", "a package, or a folder that unpack made",
+                      "a folder without manifest.json");
+    if (d.get() < 0)
+      throw RuleError("E01", root_, path, "", std::string("cannot be read: ") + std::strerror(errno));
     return d;
   }
   Bytes read_file(const Descriptor& file, const std::string& path, std::uint64_t offset,

@@ -110,8 +110,10 @@ export class RangeStore implements PackageStore {
         onBytes: (n) => onBytes?.(before + n),
       });
       m.at = a.url;
-      if (a.status === 200 && m.total < 0) throw (this.noRanges = new InputError(shownUrl(m.url), '',
-        'a server that answers ranges', whatCame(a)));
+      // 416 of the first bytes: an empty file, or a server that refuses parts.
+      if ((a.status === 200 || a.status === 416) && m.total < 0)
+        throw (this.noRanges = new InputError(shownUrl(m.url), '', 'a server that answers ranges',
+          whatCame(a)));
       if (a.status === 200 && isSameFile(a, m))
         throw new RangesEnded(shownUrl(m.url), `byte ${offset}`, 'an answer with status 206',
           'status 200: ranges are no longer answered');

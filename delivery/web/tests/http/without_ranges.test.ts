@@ -1,7 +1,7 @@
 import { describe, expect, it } from 'vitest';
 import { treeUrl } from '../../src/http/without_ranges';
 import { InputError, PackageReader } from '../../src/reader';
-import { fakeServer, treeFiles } from '../support/fake_server';
+import { FakeServer, fakeServer, treeFiles } from '../support/fake_server';
 import { expected, readSome, tree } from '../support/reading';
 import { container, openAt, openRetrying, range, rejection } from '../support/scan';
 
@@ -78,6 +78,13 @@ describe('a server without ranges', () => {
     const reader = await openRetrying(server);
     expect(reader.form).toBe('whole');
     expect(await readSome(reader)).toBe(expected);
+  });
+  it('and one that refuses parts: an empty file is called so', async () => {
+    const refusing = (file: Uint8Array): FakeServer =>
+      fakeServer({ '/a/scan.texmesh': file }, { fault: ({ range }) => !!range && 'status-416' });
+    expect((await openRetrying(refusing(container))).form).toBe('whole');
+    const { message } = await rejection(openRetrying(refusing(new Uint8Array())));
+    expect(message).not.toContain('replaced');
   });
   it('unless ranges are insisted on', async () => {
     const server = fakeServer({ '/a/scan.texmesh': container }, { ranges: false });
