@@ -45,12 +45,12 @@ std::string verdict(const StageExplanation& e) {
   return text;
 }
 
-/// The error as all other lines name the model: with its folder.
+/// The error as all other lines name the model: with its folder. Errors of stages and of files beside the
+/// model do not name it.
 std::string error_line(std::string_view model, const std::string& message) {
-  const std::size_t slash = model.rfind('/');
-  const std::string_view file = slash == model.npos ? model : model.substr(slash + 1);
-  const bool names_it = message.starts_with(std::string(file) + ":") && slash != model.npos;
-  return "error: " + (names_it ? std::string(model.substr(0, slash + 1)) : "") + message;
+  const std::string_view folder = model.substr(0, model.rfind('/') + 1), file = model.substr(folder.size());
+  const bool names_it = message.starts_with(std::string(file) + ":");
+  return fmt::format("error: {}{}{}", names_it ? folder : model, names_it ? "" : ": ", message);
 }
 
 }  // namespace

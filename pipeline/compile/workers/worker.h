@@ -371,7 +371,8 @@ class WorkerOrigin {
   WorkerOrigin(const WorkerOrigin&) = delete;
   WorkerOrigin& operator=(const WorkerOrigin&) = delete;
   /// A worker that reads `input` as the whole of its standard input, in worker_environment(). One with large
-  /// pages, and all where the origin is gone, are started anew. Throws std::runtime_error.
+  /// pages, and all where the origin is gone, are started anew. Throws ResourceError where the system gives
+  /// no process or no files.
   ChildProcess start(const std::string& input, bool large_pages);
 
  private:
@@ -387,6 +388,7 @@ class WorkerOrigin {
 ///   the predicted peaks do not fit the memory; one always runs. The last jobs get the free processors as
 ///   threads.
 /// - A child that dies, hangs or exceeds its limits costs its own model only.
+/// - A model whose child cannot start waits while others run; where none does, it fails.
 /// - A cache layer that did not work for one child is not asked by children that start within a minute.
 /// - SIGINT and SIGTERM end all children within two seconds and leave no temporary file. Jobs that had not
 ///   ended are kCancelled.

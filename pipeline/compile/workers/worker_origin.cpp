@@ -7,31 +7,37 @@
 #include <sys/syscall.h>
 #include <sys/wait.h>
 
+#include "format/base/descriptor.h"
 #include "format/base/text_bytes.h"
 #include "pipeline/compile/stage_table.h"
 #include "pipeline/compile/workers/worker.h"
 #include "pipeline/io/atomic_file.h"
 #include "pipeline/io/program.h"
+#include "pipeline/io/resolver.h"
 
 extern char** environ;
 
 namespace texmesh {
 namespace {
 
+[[noreturn]] void fail_to_start(const std::string& step, int error) {
+  throw ResourceError("texmesh", "", "a process for a model", step + ": " + std::strerror(error));
+}
+
 struct Pipe {
-  int read = -1, write = -1;
+  Descriptor read, write;
   Pipe() {
     int fds[2];
-    if (::pipe2(fds, O_CLOEXEC) != 0) throw std::runtime_error(std::string("pipe: ") + std::strerror(errno));
-    read = fds[0];
-    write = fds[1];
+    if (::pipe2(fds, O_CLOEXEC) != 0) fail_to_start("pipe", errno);
+    read.reset(fds[0]);
+    write.reset(fds[1]);
   }
 };
 
 using StandardFiles = std::array<int, 3>;
 
 /// Starts texmesh with that only argument (posix_spawn, never a fork of a threaded parent); -1 in `files`
-/// leaves this process's. Throws std::runtime_error.
+/// leaves this process's. Throws ResourceError.
 pid_t start_texmesh(std::string argument, const StandardFiles& files, bool large_pages) {
   static const std::string executable = worker_executable();
   std::vector<std::string> variables = worker_environment(large_pages);
@@ -48,7 +54,7 @@ pid_t start_texmesh(std::string argument, const StandardFiles& files, bool large
   pid_t pid = -1;
   const int rc = ::posix_spawn(&pid, executable.c_str(), &actions, nullptr, argv, environment.data());
   posix_spawn_file_actions_destroy(&actions);
-  if (rc != 0) throw std::runtime_error(std::string("cannot start a worker: ") + std::strerror(rc));
+  if (rc != 0) fail_to_start("posix_spawn", rc);
   return pid;
 }
 
@@ -102,9 +108,12 @@ WorkerOrigin::WorkerOrigin(std::size_t workers) {
   constexpr std::size_t kWorthCopying = 3;
   int ends[2];
   if (workers < kWorthCopying || ::socketpair(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0, ends) != 0) return;
-  socket_ = ends[0];
-  pid_ = start_texmesh("worker-origin", {ends[1], -1, -1}, false);
-  ::close(ends[1]);
+  Descriptor here(ends[0]), there(ends[1]);
+  try {
+    pid_ = start_texmesh("worker-origin", {there.get(), -1, -1}, false);
+    socket_ = here.release();
+  } catch (const ResourceError&) {  // each worker is started anew
+  }
 #endif
 }
 
@@ -127,14 +136,13 @@ pid_t WorkerOrigin::copy(const StandardFiles& files) {
 ChildProcess WorkerOrigin::start(const std::string& input, bool large_pages) {
   ChildProcess child;
   Pipe in, out, err;
-  const StandardFiles files{in.read, out.write, err.write};
+  const StandardFiles files{in.read.get(), out.write.get(), err.write.get()};
   if (!large_pages) child.pid = copy(files);
   if (child.pid < 0) child.pid = start_texmesh("worker", files, large_pages);
-  for (const int fd : files) ::close(fd);
-  write_all(in.write, text_bytes(input));  // a child that is gone says the rest by its exit status
-  ::close(in.write);
-  child.out = out.read;
-  child.err = err.read;
+  for (Descriptor* const end : {&in.read, &out.write, &err.write}) end->reset();
+  write_all(in.write.get(), text_bytes(input));  // a child that is gone says the rest by its exit status
+  child.out = out.read.release();
+  child.err = err.read.release();
   for (int fd : {child.out, child.err}) ::fcntl(fd, F_SETFL, O_NONBLOCK);
   child.start = std::chrono::steady_clock::now();
   return child;

@@ -182,13 +182,12 @@ class WorkerPool {
   }
 
   std::vector<WorkerReport> run() {
-    bool stop = false;
-    while (!workers_.empty() || (!waiting_.empty() && !stop && !g_interrupted)) {
-      while (!stop && !g_interrupted && start_one()) continue;
+    while (!workers_.empty() || (!waiting_.empty() && !stop_ && !g_interrupted)) {
+      while (!stop_ && !g_interrupted && start_one()) continue;
       if (g_interrupted) interrupt_workers();
       wait_for_something();
       enforce_wall_limit();
-      if (remove_ended() && settings_.stop_on_failure) stop = true;
+      remove_ended();
     }
     return std::move(reports_);
   }
@@ -209,13 +208,20 @@ class WorkerPool {
     const auto next = std::find_if(waiting_.begin(), waiting_.end(), fits);
     if (next == waiting_.end()) return false;
     const std::size_t job = *next;
-    waiting_.erase(next);
-    reports_[job].result = ModelResult::kInternal;
-    reports_[job].ran = true;
     const std::size_t side_by_side =
-        std::min<std::size_t>(static_cast<std::size_t>(processors), workers_.size() + 1 + waiting_.size());
+        std::min<std::size_t>(static_cast<std::size_t>(processors), workers_.size() + waiting_.size());
     const int threads = std::max(1, processors / static_cast<int>(side_by_side));
-    workers_.push_back(start_worker(job, threads));
+    try {
+      workers_.push_back(start_worker(job, threads));
+      reports_[job].result = ModelResult::kInternal;
+    } catch (const ResourceError& e) {
+      if (!workers_.empty()) return false;  // what they give back when they end may be enough
+      reports_[job].result = ModelResult::kFailed;
+      set_error(reports_[job], "resource", jobs_[job], e.expected(), e.found());
+      tell_end(job, true);
+    }
+    reports_[job].ran = true;
+    waiting_.erase(next);
     return true;
   }
 
@@ -288,9 +294,7 @@ class WorkerPool {
     }
   }
 
-  /// Removes the workers that have ended; true when one of them failed.
-  bool remove_ended() {
-    bool failed = false;
+  void remove_ended() {
     for (std::size_t i = 0; i < workers_.size();) {
       Worker& w = workers_[i];
       int status = 0;
@@ -305,14 +309,18 @@ class WorkerPool {
       if (w.process.err >= 0) read_available(w.process.err, w.last_words);
       const bool told = !report.more->error.kind.empty();
       finish_report(w, status, usage, limits_, jobs_[w.job], g_interrupted != 0, report);
-      if (!told && !report.more->error.kind.empty() && sink_) sink_(w.job, ErrorTold{"", report.more->error});
-      failed = failed || !report.ok();
       close_fd(w.process.out);
       close_fd(w.process.err);
-      if (finished_) finished_(w.job, report);
+      tell_end(w.job, !told && !report.more->error.kind.empty());
       workers_.erase(workers_.begin() + static_cast<std::ptrdiff_t>(i));
     }
-    return failed;
+  }
+
+  void tell_end(std::size_t job, bool tell_error) {
+    const WorkerReport& report = reports_[job];
+    if (tell_error && sink_) sink_(job, ErrorTold{"", report.more->error});
+    if (finished_) finished_(job, report);
+    if (!report.ok() && settings_.stop_on_failure) stop_ = true;
   }
 
   const std::vector<WorkerJob>& jobs_;
@@ -324,6 +332,7 @@ class WorkerPool {
   std::vector<WorkerReport> reports_;
   std::vector<std::size_t> waiting_;
   std::vector<Worker> workers_;
+  bool stop_ = false;  // no further job starts
   std::map<std::string, LayerRest> layers_left_out_;
   Clock::time_point start_ = Clock::now();
   std::optional<Clock::time_point> interrupted_at_;
