@@ -146,7 +146,7 @@ struct Extracted {
       "otherwise the file is the smallest possible one.");
     v("difference", s.asked(s.difference), Range{0, 1},
       "Mean FLIP of the file's lit pictures against those of the package's best, over the object's pixels; 0 = "
-      "equal.");
+      "equal. Of large pictures a quarter of the rows counts; all of them with --best.");
     v("mesh_difference", s.asked(s.mesh_difference), Range{0, 1},
       "The same with the best textures instead: what the mesh alone costs.");
     v("views", s.asked(s.views), Range{0, 1000},

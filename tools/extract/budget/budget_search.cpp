@@ -1,6 +1,7 @@
 // The search behind extract --bytes. Its story:
 // 1. A Reference is made once: the package's best, S_0 with the best texels, in pictures lit as texmesh
-// render lights them. Everything is judged by FLIP against these pictures.
+// render lights them. Everything is judged by FLIP against these pictures: of large ones
+// by a quarter of the rows, with --best by all.
 // 2. Candidates are coded meshes and coded images. Each is made when it is first asked for.
 // 3. Small windows of the pictures tell what bytes are worth. S_0 is rendered with one image coded in many
 // ways, which gives each image a curve of loss against bytes (LossCurves). Of a large texture only the parts
@@ -12,10 +13,11 @@
 // where it takes away most loss.
 // 5. The file is written and filled up to at least 98 % of the bytes (Filling).
 // 6. Sums of losses are guesses, so in a small file whole pictures decide between few: other sizes of the
-// texture that loses most, a leaner mesh, other shares. One that is plainly worse in a view is not looked at
-// further. With --best many more files are looked at, in a small file those of other likely meshes and
-// codings, too. In a large file textures may be full: then the mesh is finer.
-// 7. Last, proxies of the package are tried in its place (offer_proxies()).
+// texture that loses most, in few bytes other codings of it, a leaner mesh, other shares. One that is plainly
+// worse in a view is not looked at further. With --best many more files are looked at, in a small file those
+// of other likely meshes and codings, too. In a large file textures may be full: then the mesh is finer.
+// 7. Proxies of the package are tried in its place (offer_proxies()): in a small file before the other few,
+// which are not looked at where a proxy is plainly nearer.
 // Where the bytes hold S_0 and all of the source's own images, nothing is looked for (whole_source()).
 #include "tools/extract/budget/budget_search.h"
 
@@ -35,9 +37,11 @@ constexpr double kFewestExtraBits = -3, kMostExtraBits = 9;
 constexpr int kMeshTries = 12;
 constexpr double kSurely = 0.9;  // of a loss that others tell
 constexpr std::uint64_t kLookAtFilesBelow = 200000;
-constexpr int kFewLooks = 6;           // beside the first
+constexpr int kFewLooks = 8;  // beside the first
+constexpr std::uint64_t kTryCodingsBelow = 50000;
 constexpr double kPlainlyWorse = 1.1;  // in one view
-constexpr double kLikely = 1.2;        // times the least joined loss
+constexpr double kPlainlyNearer = 0.9;
+constexpr double kLikely = 1.2;  // times the least joined loss
 constexpr std::size_t kMostLikely = 4;
 constexpr double kWorthALook = 1.15;  // times the least joined loss that was seen, by tables
 constexpr double kUsualBytes = 3.5, kLeastBytes = 1.5;          // of a coded triangle
@@ -168,7 +172,9 @@ std::optional<Extracted> Search::source_file() {
   return out;
 }
 
-Extracted Search::run(const std::function<void(double)>& report) {
+Extracted Search::run(const std::function<void(double)>& report,
+                      const std::function<void(Extracted&)>& offer) {
+  offer_ = offer;
   curves();
   report(0.4);
   spent_.images_cpu_s = clock_.since_last_s();
@@ -184,7 +190,12 @@ Extracted Search::run(const std::function<void(double)>& report) {
     if (FoundFile other = filled_file(); filling_.fills(other.file)) found = std::move(other);
   }
   Extracted out = finish(std::move(found));
-  spent_.file_cpu_s = clock_.since_last_s();
+  spent_.file_cpu_s += clock_.since_last_s();
+  if (!offered_)
+    offer_(out);
+  else if (offered_->proxy && (!out.within || offered_->difference < out.difference))
+    out = *std::move(offered_);
+  spent_.proxies_cpu_s += clock_.since_last_s();
   out.spent = spent_;
   return out;
 }
@@ -364,15 +375,28 @@ void Search::look_at_files(FoundFile& best) {
   try_other_files(best);
 }
 
-/// What --best changes most often, in turn: the size of the texture that loses most, the mesh's coding, what
-/// other textures get.
+/// What --best changes most often, in turn: in few bytes the coding of the texture that loses most, its size,
+/// the mesh's coding, what other textures get.
 void Search::look_at_few_files(FoundFile& best) {
   if (best.images.images.empty() || reference_.cameras.empty()) return;
   look_at(best);
+  if (proxy_is_plainly_nearer(best)) return;
   looks_left_ = kFewLooks;
+  if (bytes_ <= kTryCodingsBelow) try_other_codings(best);
   try_other_sizes(best, {1, -1});
   try_other_codings_of_mesh(best);
   try_other_shares(best);
+}
+
+/// Than any file of a scale that a few more looks may find.
+bool Search::proxy_is_plainly_nearer(const FoundFile& found) {
+  if (!offered_) {
+    offered_ = finish(found);
+    spent_.file_cpu_s += clock_.since_last_s();
+    offer_(*offered_);
+    spent_.proxies_cpu_s += clock_.since_last_s();
+  }
+  return offered_->proxy && offered_->difference < kPlainlyNearer * found.difference;
 }
 
 /// But for the best.
@@ -498,14 +522,14 @@ void Search::look_at(FoundFile& found, const FoundFile* rival) {
   found.parts.assign(meter.count(), 0);
   RunContext one = reference_.context;
   one.threads = 1;
+  candidates_.prepare_views(found.key);
   const auto look = [&](const std::vector<std::size_t>& views) {
-    std::unique_ptr<const LitViews> made;
-    if (!found.key.is_finest()) made = candidates_.made_views(found.key, views);
-    const LitViews& seen = made ? *made : *reference_.finest_views;
+    const RunContext& context = views.size() == 1 ? reference_.context : one;
     parallel_for(reference_.context, views.size(), 1, [&](std::size_t begin, std::size_t end) {
-      for (std::size_t k = begin; k < end; ++k)
-        found.parts[views[k]] = meter.part(views[k], seen, made ? k : views[k], textures,
-                                           views.size() == 1 ? reference_.context : one);
+      for (std::size_t k = begin; k < end; ++k) {
+        const auto [seen, at] = candidates_.view(found.key, views[k], context);
+        found.parts[views[k]] = meter.part(views[k], seen, at, textures, context);
+      }
     });
   };
   const std::size_t first = meter.fullest();
@@ -630,15 +654,12 @@ std::vector<Extracted> extract_within_bytes(PackageReader& package, const Extrac
     const double reference_cpu_s = clock.since_last_s();
     report(0.2);
     Extracted& found = out[order[i]];
-    found = Search(shared->reference, shared->candidates, wanted).run(report);
+    found = Search(shared->reference, shared->candidates, wanted).run(report, [&](Extracted& file) {
+      offer_proxies(shared->reference, wanted, shared->proxies, file);
+    });
+    found.spent.reference_cpu_s = reference_cpu_s;
     shared->candidates.forget_lit_meshes();
-    report(0.9);
-    ExtractSpent spent = found.spent;
-    spent.reference_cpu_s = reference_cpu_s;
     clock.since_last_s();
-    offer_proxies(shared->reference, wanted, shared->proxies, found);
-    spent.proxies_cpu_s = clock.since_last_s();
-    found.spent = spent;
     report(1);
   }
   return out;

@@ -38,8 +38,8 @@ struct FoundFile {
 class Search {
  public:
   Search(const Reference& reference, Candidates& candidates, std::uint64_t bytes);
-  /// `report`: parts of the way.
-  Extracted run(const std::function<void(double)>& report);
+  /// `report`: parts of the way. `offer`: replaces a file by one of a proxy that looks nearer.
+  Extracted run(const std::function<void(double)>& report, const std::function<void(Extracted&)>& offer);
   /// S_0 and the source's own images; nothing where the bytes do not hold them.
   std::optional<Extracted> source_file();
 
@@ -87,6 +87,7 @@ class Search {
 
   void look_at_files(FoundFile& best);
   void look_at_few_files(FoundFile& best);
+  bool proxy_is_plainly_nearer(const FoundFile& found);
   std::vector<MeshKey> likeliest() const;
   // Whether the best has changed.
   bool replace_if_nearer(FoundFile found, FoundFile& best);
@@ -115,6 +116,8 @@ class Search {
   double known_bytes_ = 0;
   bool only_likely_ = false;  // meshes that tables make hopeless are not looked at
   double least_ = 1e9;
+  std::function<void(Extracted&)> offer_;
+  std::optional<Extracted> offered_;  // a file, or the proxy's that has replaced it
   std::vector<TriedFile> tried_;
   int looks_left_ = 1000;  // at files other than the first
 };

@@ -10,6 +10,7 @@ namespace {
 
 constexpr std::size_t kTrialsAtOnce = 24;     // a megabyte or two each
 constexpr std::uint32_t kMostWebpPx = 16383;  // of a side, of the format
+constexpr std::size_t kSmallTexels = 262144;  // of such an image the texels are kept
 constexpr std::size_t kMostScales = 3;        // decoded at a time: tens of megabytes each
 
 /// Bits per coordinate along the longest side of the object, of texture coordinates along the image, of
@@ -105,24 +106,36 @@ const LitMesh& Candidates::lit_mesh(const MeshKey& key) {
   return *c.lit;
 }
 
-std::unique_ptr<const LitViews> Candidates::made_views(const MeshKey& key,
-                                                       const std::vector<std::size_t>& cameras) {
-  std::vector<LitCamera> some;
-  for (const std::size_t c : cameras) some.push_back(reference_.cameras[c]);
-  return std::make_unique<LitViews>(lit_mesh(key), some, reference_.context);
+void Candidates::prepare_views(const MeshKey& key) {
+  lit_mesh(key);
+  meshes_.at(key).views.resize(reference_.cameras.size());
+}
+
+std::pair<const LitViews&, std::size_t> Candidates::view(const MeshKey& key, std::size_t camera,
+                                                         const RunContext& context) {
+  if (key.is_finest()) return {*reference_.finest_views, camera};
+  MeshCandidate& c = meshes_.at(key);
+  std::unique_ptr<const LitViews>& view = c.views[camera];
+  if (!view) view = std::make_unique<LitViews>(*c.lit, std::vector{reference_.cameras[camera]}, context);
+  return {*view, 0};
 }
 
 void Candidates::forget(const MeshKey& key) {
   const auto it = meshes_.find(key);
   if (it == meshes_.end()) return;
-  if (for_several_)
+  if (for_several_) {
+    it->second.views.clear();
     it->second.lit.reset();
-  else
+  } else {
     meshes_.erase(it);
+  }
 }
 
 void Candidates::forget_lit_meshes() {
-  for (auto& [key, mesh] : meshes_) mesh.lit.reset();
+  for (auto& [key, mesh] : meshes_) {
+    mesh.views.clear();
+    mesh.lit.reset();
+  }
 }
 
 double size_step(int step) {
@@ -179,23 +192,20 @@ float Candidates::sharpening(std::size_t image, double share) const {
 }
 
 Pixels Candidates::texels(std::size_t image, double share) {
+  if (const auto known = small_.find({image, share}); known != small_.end()) return known->second;
   const Vec2<std::uint32_t> side = sides(image, share);
   std::vector<std::uint8_t> coverage;
   if (reference_.wishes.images != ExtractImages::kPng)
     coverage = reference_.shown_texels(image, side.x, side.y);
-  return textures_.texels(image, side.x, side.y, coverage, sharpening(image, share));
+  Pixels out = textures_.texels(image, side.x, side.y, coverage, sharpening(image, share));
+  if (std::size_t{side.x} * side.y <= kSmallTexels) small_[{image, share}] = out;
+  return out;
 }
 
 Vec2<std::uint32_t> Candidates::sides(std::size_t image, double share) const {
   const PackageImage& from = reference_.images[image];
   const double most = std::min(share, textures_.largest_share(image));
   return {side_of(from.width_px, most), side_of(from.height_px, most)};
-}
-
-const Pixels& Candidates::texels_of_step(std::size_t image, int step) {
-  const auto [it, fresh] = by_step_.try_emplace({image, step});
-  if (fresh) it->second = texels(image, size_step(step));
-  return it->second;
 }
 
 FileImageData Candidates::encoded(std::size_t image, const Pixels& pixels, const TextureCoding& coding,
@@ -223,6 +233,12 @@ std::vector<CodedImage> Candidates::measured(const std::vector<ImageTrial>& tria
   std::vector<CodedImage> out;
   for (const ImageTrial& t : trials) out.push_back(measured_.at(t));
   return out;
+}
+
+const Pixels& Candidates::texels_of_step(std::size_t image, int step) {
+  const auto [it, fresh] = by_step_.try_emplace({image, step});
+  if (fresh) it->second = texels(image, size_step(step));
+  return it->second;
 }
 
 /// Null where a whole file is made: of stored coefficients, of codings that do not code blocks apart, of

@@ -36,6 +36,7 @@ struct MeshCandidate {
   std::shared_ptr<const StandaloneGlb> file;  // without what is known of the object
   std::unique_ptr<const LitMesh>
       lit;  // as viewers show it; null: Candidates::lit_mesh() makes it again, or has it
+  std::vector<std::unique_ptr<const LitViews>> views;  // of `lit`, each of a camera that was asked for
 };
 
 /// Losses in the same pixels, of a mesh and of the images of a material, join about as the sum of their
@@ -96,8 +97,11 @@ class Candidates {
       : reference_(reference), textures_(textures), for_several_(for_several) {}
 
   const MeshCandidate& mesh(const MeshKey& key);
-  /// What some of the cameras see of the mesh in whole pictures.
-  std::unique_ptr<const LitViews> made_views(const MeshKey& key, const std::vector<std::size_t>& cameras);
+  /// What a camera sees of the mesh, as one of some views, after prepare_views(). Several threads may ask for
+  /// different cameras.
+  std::pair<const LitViews&, std::size_t> view(const MeshKey& key, std::size_t camera,
+                                               const RunContext& context);
+  void prepare_views(const MeshKey& key);
   void forget(const MeshKey& key);  // a mesh takes tens of megabytes
   void forget_lit_meshes();
 
@@ -146,6 +150,7 @@ class Candidates {
   std::list<ScaleToCode> scales_;  // the last first
   std::map<MeshKey, MeshCandidate> meshes_;
   std::map<std::pair<std::size_t, int>, Pixels> by_step_;
+  std::map<std::pair<std::size_t, double>, Pixels> small_;  // by image and share of its sides
   struct StepTiles {
     Pixels image;
     std::optional<TextureTiles> tiles;

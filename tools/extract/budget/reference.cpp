@@ -25,8 +25,8 @@ RunContext serial(const RunContext& context) {
 
 bool covered(const Visibility& view, std::size_t pixel) { return view.first[pixel] < view.first[pixel + 1]; }
 
-/// A camera at the same place that looks at a pixel, with pixels of the same size.
-LitCamera window_at(const Visibility& view, std::size_t pixel, std::uint32_t side_px) {
+/// A camera at the same place that looks at a pixel, at so much of the picture's side.
+LitCamera window_at(const Visibility& view, std::size_t pixel, std::uint32_t side_px, double share) {
   const RenderCamera& from = view.camera;
   const double pitch = 2 * from.tan_half_fov / view.side_px;
   const auto offset = [&](std::size_t place) {
@@ -34,8 +34,9 @@ LitCamera window_at(const Visibility& view, std::size_t pixel, std::uint32_t sid
   };
   const Vec3d towards =
       from.x * offset(pixel % view.side_px) - from.y * offset(pixel / view.side_px) - from.z;
-  LitCamera out{look_at_camera(from.eye, from.eye + towards, from.y, kRenderFovDegrees, from.near), side_px};
-  out.camera.tan_half_fov = pitch * 0.5 * side_px;
+  LitCamera out{
+      look_at_camera(from.eye, from.eye + towards, from.y, kRenderFovDegrees, from.near), side_px, {}};
+  out.camera.tan_half_fov = from.tan_half_fov * share;
   return out;
 }
 
@@ -82,16 +83,25 @@ BoundingSphere sphere_of(const Mesh& mesh) {
 std::vector<LitCamera> cameras_around(const BoundingSphere& bounds, int count, std::uint32_t side_px) {
   std::vector<LitCamera> out;
   for (int v = 0; v < count; ++v)
-    out.push_back({perspective_camera(camera_of(v, count, bounds.centre, bounds.radius)), side_px});
+    out.push_back({perspective_camera(camera_of(v, count, bounds.centre, bounds.radius)), side_px, {}});
   return out;
 }
 
+void LitCamera::cut(Picture& picture) const {
+  constexpr std::uint32_t kReach = kFilterReach;
+  for (std::uint32_t y = 0; y < side_px && !bands.empty(); ++y) {
+    const std::uint32_t first = y - std::min(y, kReach), last = std::min(y + kReach, side_px - 1);
+    if (!bands[first / kBandPx] || !bands[last / kBandPx])
+      std::fill_n(picture.covered.data() + std::size_t{y} * side_px, side_px, 0);
+  }
+}
+
 LitViews::LitViews(const LitMesh& mesh, const std::vector<LitCamera>& cameras, const RunContext& context)
-    : mesh_(&mesh), views_(cameras.size()) {
+    : mesh_(&mesh), cameras_(cameras), views_(cameras.size()) {
   const RenderScene scene = render_scene(mesh.mesh, mesh.materials, mesh.texture_count);
   parallel_for(context, cameras.size(), 1, [&](std::size_t begin, std::size_t end) {
     for (std::size_t v = begin; v < end; ++v)
-      views_[v] = look(scene, cameras[v].camera, cameras[v].side_px, serial(context));
+      views_[v] = look(scene, cameras[v].camera, cameras[v].side_px, serial(context), cameras[v].bands);
   });
 }
 
@@ -114,7 +124,30 @@ PictureVariants LitViews::pictures(std::size_t view, const std::vector<const Mat
                         textures, environment, context);
 }
 
-std::vector<LitCamera> windows_of(const LitViews& views, int per_view, std::uint32_t side_px) {
+std::vector<std::uint8_t> bands_of(const LitViews& views, std::size_t view, std::uint32_t picture_px) {
+  constexpr std::uint32_t kCycle = 8, kTogether = 2;  // bands, and those of them that are looked at
+  constexpr double kEnoughPx = 16000, kFewer = 0.8;
+  const Visibility& seen = views.visibility(view);
+  const std::uint32_t bands = (picture_px + kBandPx - 1) / kBandPx;
+  std::array<double, kCycle / kTogether> shown{};  // by what is looked at
+  double sum = 0;
+  for (std::size_t i = 0; i + 1 < seen.first.size(); ++i) {
+    if (!covered(seen, i)) continue;
+    const std::size_t row = i / seen.side_px * picture_px / seen.side_px;
+    shown[row / kBandPx % kCycle / kTogether] += 1;
+    sum += 1;
+  }
+  const double scale = static_cast<double>(picture_px) / seen.side_px;
+  if (sum * scale * scale < kEnoughPx) return {};
+  std::size_t part = view % shown.size();
+  while (shown[part] * static_cast<double>(shown.size()) < kFewer * sum) part = (part + 1) % shown.size();
+  std::vector<std::uint8_t> out;
+  for (std::uint32_t b = 0; b < bands; ++b) out.push_back(b % kCycle / kTogether == part);
+  return out;
+}
+
+std::vector<LitCamera> windows_of(const LitViews& views, std::uint32_t picture_px, int per_view,
+                                  std::uint32_t side_px) {
   std::vector<LitCamera> out;
   for (std::size_t v = 0; v < views.count(); ++v) {
     const Visibility& view = views.visibility(v);
@@ -127,8 +160,8 @@ std::vector<LitCamera> windows_of(const LitViews& views, int per_view, std::uint
     for (int k = 0; k < per_view; ++k) {
       const double rank = (k + 0.25 + 0.5 * static_cast<double>(v) / static_cast<double>(views.count())) /
                           per_view * static_cast<double>(shown.size());
-      out.push_back(
-          window_at(view, shown[std::min(static_cast<std::size_t>(rank), shown.size() - 1)], side_px));
+      out.push_back(window_at(view, shown[std::min(static_cast<std::size_t>(rank), shown.size() - 1)],
+                              side_px, static_cast<double>(side_px) / picture_px));
     }
   }
   return out;
@@ -138,8 +171,11 @@ LitMeter::LitMeter(const LitViews& views, const std::vector<RenderTexture>& text
                    const RenderEnvironment& environment, const RunContext& context)
     : environment_(environment), reference_(views.count()), weights_(views.count()) {
   parallel_for(context, views.count(), 1, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t v = begin; v < end; ++v)
-      reference_[v] = prepare_flip(views.picture(v, textures, environment_, serial(context)));
+    for (std::size_t v = begin; v < end; ++v) {
+      Picture picture = views.picture(v, textures, environment_, serial(context));
+      views.camera(v).cut(picture);
+      reference_[v] = prepare_flip(picture);
+    }
   });
   double sum = 0;
   for (std::size_t v = 0; v < views.count(); ++v)
@@ -161,7 +197,8 @@ double LitMeter::difference(const LitViews& views, const std::vector<RenderTextu
 
 double LitMeter::part(std::size_t view, const LitViews& views, std::size_t made,
                       const std::vector<RenderTexture>& textures, const RunContext& context) const {
-  const Picture picture = views.picture(made, textures, environment_, context);
+  Picture picture = views.picture(made, textures, environment_, context);
+  views.camera(made).cut(picture);
   return weights_[view] * flip_of(reference_[view], prepare_flip(picture));
 }
 
@@ -214,11 +251,11 @@ Reference::Reference(PackageReader& from, const ExtractBudget& asked, const Outp
   find_groups();
   find_alike();
   finest = lit_mesh(source);
-  finest_views = std::make_unique<LitViews>(finest, cameras, context);
-  measure_surface(*finest_views);
-  windows = side_px < 2 * kWindowPx ? cameras : windows_of(*finest_views, kWindowsPerView, kWindowPx);
+  choose_views(
+      LitViews(finest, cameras_around(sphere, kViews, wishes.best() ? side_px : side_px / 4), context));
   read_best_textures(textures);
   environment = studio_environment();
+  finest_views = std::make_unique<LitViews>(finest, cameras, context);
   finest_windows = std::make_unique<LitViews>(finest, windows, context);
   window_meter = std::make_unique<LitMeter>(*finest_windows, best_textures, environment, context);
   whole_meter = std::make_unique<LitMeter>(*finest_views, best_textures, environment, context);
@@ -293,12 +330,22 @@ LitMesh Reference::lit_mesh(Model& model) const {
   return out;
 }
 
-/// Texels that S_0 shows over the pixels that its whole surface has on the screen: four times its mean
-/// outline, as if it were convex.
-void Reference::measure_surface(const LitViews& views) {
-  constexpr std::uint32_t kSide = 256;
+/// `small`: what the cameras see in pictures that may be smaller.
+void Reference::choose_views(const LitViews& small) {
+  const double scale = static_cast<double>(side_px) / small.camera(0).side_px;
   double pixels = 0;
-  for (std::size_t v = 0; v < views.count(); ++v) pixels += static_cast<double>(views.covered_px(v));
+  for (std::size_t v = 0; v < cameras.size(); ++v) {
+    pixels += static_cast<double>(small.covered_px(v)) * scale * scale;
+    if (!wishes.best()) cameras[v].bands = bands_of(small, v, side_px);
+  }
+  measure_surface(pixels);
+  windows = side_px < 2 * kWindowPx ? cameras : windows_of(small, side_px, kWindowsPerView, kWindowPx);
+}
+
+/// Texels that S_0 shows over the pixels that its whole surface has on the screen: four times its mean
+/// outline, as if it were convex. `pixels`: of the outlines of all views.
+void Reference::measure_surface(double pixels) {
+  constexpr std::uint32_t kSide = 256;
   pixels = std::max(4 * pixels / kViews, 1.0);
   for (std::size_t i = 0; i < images.size(); ++i) {
     double covered = 0;

@@ -24,6 +24,9 @@ struct LitMesh {
 struct LitCamera {
   RenderCamera camera;
   std::uint32_t side_px = 0;
+  std::vector<std::uint8_t> bands;  // as look() takes them; empty: all
+  /// Takes rows that filters mix with what is beside the bands out of the picture's covered pixels.
+  void cut(Picture& picture) const;
 };
 
 /// `count` directions spread evenly over the sphere around `bounds`, as texmesh render has them.
@@ -35,6 +38,7 @@ class LitViews {
   /// `mesh` must stay where it is.
   LitViews(const LitMesh& mesh, const std::vector<LitCamera>& cameras, const RunContext& context);
   std::size_t count() const { return views_.size(); }
+  const LitCamera& camera(std::size_t view) const { return cameras_[view]; }
   std::uint64_t covered_px(std::size_t view) const;
   const Visibility& visibility(std::size_t view) const { return views_[view]; }
   const LitMesh& mesh() const { return *mesh_; }
@@ -47,12 +51,17 @@ class LitViews {
 
  private:
   const LitMesh* mesh_;
+  std::vector<LitCamera> cameras_;
   std::vector<Visibility> views_;
 };
 
-/// Parts of the pictures as they were taken, `per_view` of each view: squares of `side_px` around pixels that
-/// show the mesh, spread over all that do. Their pixels are as large as those of the pictures.
-std::vector<LitCamera> windows_of(const LitViews& views, int per_view, std::uint32_t side_px);
+/// Parts of pictures `picture_px` high of the same cameras, `per_view` of each view: squares of `side_px`
+/// around places that show the mesh, spread over all that do.
+std::vector<LitCamera> windows_of(const LitViews& views, std::uint32_t picture_px, int per_view,
+                                  std::uint32_t side_px);
+/// Of a picture `picture_px` high that shows far more pixels than tell files apart: a quarter of its rows,
+/// which show about as many as others do; another quarter in the next view. Else empty: all.
+std::vector<std::uint8_t> bands_of(const LitViews& views, std::size_t view, std::uint32_t picture_px);
 
 /// Textures that stand for others, by the place of those in the list.
 using OtherTextures = std::map<std::size_t, RenderTexture>;
@@ -142,7 +151,8 @@ struct Reference {
   double fewest_texels_per_pixel(std::size_t image) const;
   void find_groups();
   void find_alike();
-  void measure_surface(const LitViews& views);
+  void choose_views(const LitViews& small);
+  void measure_surface(double pixels);
   void read_best_textures(TextureSource& textures);
   std::vector<double> fewest_texels_;  // per pixel, by image at full size, where pictures show it
   std::vector<std::size_t> alike_;     // by image: the first that the same triangles show in the same way

@@ -90,9 +90,10 @@ void require_valid(std::span<const std::uint8_t> glb, const std::string& entry, 
 
 }  // namespace
 
-StandaloneGlb::StandaloneGlb(std::span<const std::uint8_t> glb, std::string entry, GlbRules rules)
+StandaloneGlb::StandaloneGlb(std::span<const std::uint8_t> glb, std::string entry,
+                             std::optional<GlbRules> rules)
     : entry_(std::move(entry)) {
-  require_valid(glb, entry_, rules);
+  if (rules) require_valid(glb, entry_, *rules);
   GlbParts parts = read_glb(glb, entry_);
   const Bytes& binary = parts.binary;
   root_ = std::move(parts.root);
@@ -440,7 +441,9 @@ StandaloneGlb scale_file(PackageReader& package, int scale, const RunContext& co
   make_tangents(mesh, first.tangent_texcoords());
   ScalesOptions options;
   options.mesh_codec = first.codec();
-  first.take_meshes({write_streamed_scale(mesh, reader.head(), options), mesh_path(scale)});
+  // Streamed normals are for searches, which decode what they look at.
+  const auto rules = fitted ? std::optional(GlbRules::kPackage) : std::nullopt;
+  first.take_meshes({write_streamed_scale(mesh, reader.head(), options), mesh_path(scale), rules});
   return first;
 }
 

@@ -15,8 +15,10 @@ namespace texmesh {
 class StandaloneGlb {
  public:
   /// Checks the whole file first (check_glb.h), by the rules of a package's meshes; those of a standalone
-  /// file are a proxy's. `entry` is for messages. FormatError.
-  StandaloneGlb(std::span<const std::uint8_t> glb, std::string entry, GlbRules rules = GlbRules::kPackage);
+  /// file are a proxy's. Without rules nothing is checked: of files that were just written, which takes
+  /// decoding them. `entry` is for messages. FormatError.
+  StandaloneGlb(std::span<const std::uint8_t> glb, std::string entry,
+                std::optional<GlbRules> rules = GlbRules::kPackage);
 
   /// Source images that the file's images stand for ("texture/<number>"), in the file's order.
   std::vector<std::uint32_t> source_images() const;

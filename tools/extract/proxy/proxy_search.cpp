@@ -156,7 +156,7 @@ StandaloneGlb uncoded(const Mesh& mesh, const std::string& entry) {
   SplitStreamHead head;
   const Box3f box = bounding_box(mesh.positions);
   head.position = {kUncodedBits, {box.min.x, box.min.y, box.min.z}, static_cast<float>(side_of_box(mesh))};
-  return {write_streamed_scale(mesh, head, {}), entry};
+  return {write_streamed_scale(mesh, head, {}), entry, std::nullopt};
 }
 
 constexpr double kVertexShare = 0.8;
@@ -269,7 +269,7 @@ StandaloneGlb ProxyParts::file(const ProxyMapChoice& choice, std::size_t mesh, c
       chunks.root["extensionsUsed"].push_back("KHR_materials_unlit");
   const Vec3d origin = meshes_.front().origin;
   if (!(origin == Vec3d{})) chunks.root["nodes"][0]["translation"] = {origin.x, origin.y, origin.z};
-  return {glb_container(chunks.root.dump(), chunks.binary), entry_};
+  return {glb_container(chunks.root.dump(), chunks.binary), entry_, std::nullopt};
 }
 
 std::vector<ProxyMap> ProxyParts::maps(const ProxyMapChoice& choice) const {

@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <set>
+
 #include "tests/support/meshes.h"
 
 namespace texmesh::lit_meter_test {
@@ -55,7 +57,7 @@ TEST(Windows, ShowThePartOfThePictureThatTheyStandFor) {
   const LitMesh mesh = sphere(12, false);
   const std::vector<LitCamera> cameras = cameras_of(mesh);
   const LitViews views(mesh, cameras, {});
-  const std::vector<LitCamera> windows = windows_of(views, 2, 32);
+  const std::vector<LitCamera> windows = windows_of(views, kSide, 2, 32);
   ASSERT_EQ(windows.size(), 2 * cameras.size());
   const LitViews parts(mesh, windows, {});
   for (std::size_t w = 0; w < windows.size(); ++w) {
@@ -64,6 +66,27 @@ TEST(Windows, ShowThePartOfThePictureThatTheyStandFor) {
     EXPECT_NEAR(part.tan_half_fov / windows[w].side_px, whole.tan_half_fov / kSide, 1e-12);
     EXPECT_GT(parts.covered_px(w), 32u * 32u / 5);
   }
+}
+
+TEST(Bands, OfAQuarterOfTheRowsTellAboutWhatAllTell) {
+  constexpr std::uint32_t kLargeSide = 512;
+  const LitMesh mesh = sphere(12, true);
+  std::vector<LitCamera> cameras = cameras_around(bounding_sphere(mesh.mesh.positions), 3, kLargeSide);
+  const LitViews small(mesh, cameras_of(mesh), {}), whole(mesh, cameras, {});
+  std::set<std::vector<std::uint8_t>> parts;
+  for (std::size_t v = 0; v < cameras.size(); ++v) {
+    cameras[v].bands = bands_of(small, v, kLargeSide);
+    EXPECT_EQ(std::ranges::count(cameras[v].bands, 1), 4);
+    parts.insert(cameras[v].bands);
+    EXPECT_TRUE(bands_of(small, v, kSide).empty());
+  }
+  EXPECT_GT(parts.size(), 1u);
+  const LitViews some(mesh, cameras, {});
+  const RenderEnvironment environment = studio_environment();
+  const double all = LitMeter(whole, {normals(128)}, environment, {}).difference(whole, {normals(200)}, {}),
+               part = LitMeter(some, {normals(128)}, environment, {}).difference(some, {normals(200)}, {});
+  EXPECT_NEAR(part, all, 0.2 * all);
+  EXPECT_NE(part, all);
 }
 
 }  // namespace texmesh::lit_meter_test
