@@ -203,11 +203,11 @@ test('viewer: a slow link shows progress, then the picture', () => withViewer('?
 
 test('viewer: errors can be read', async () => {
   for (const [name, query, text, options] of [
-    ['404', '?pkg=packages/none.texmesh', /no package here/i, {}],
+    ['404', '?pkg=packages/none.texmesh', /no package here.*Look at the address/i, {}],
     ['no-package', '?pkg=index.html', /not a package/i, {}],
     ['visitor-404', '?pkg=packages/none.texmesh&panel=none', /^This object is not here any more\.Try again$/, {}],
     ['visitor-page', '?pkg=index.html&panel=none', /^This object cannot be shown\.Try again$/, {}],
-    ['server-error', '?pkg=packages/maps.texmesh', /could not be loaded/i, {fault: (q) => (q.path.endsWith('.texmesh') ? {status: 500} : undefined)}],
+    ['server-error', '?pkg=packages/maps.texmesh', /could not be loaded.*The server does not give/i, {fault: (q) => (q.path.endsWith('.texmesh') ? {status: 500} : undefined)}],
   ]) {
     await withViewer(query, async (page) => {
       await page.locator('#message').waitFor({state: 'visible', timeout: 20000});

@@ -26,18 +26,21 @@ export function showError(error: unknown, url: string): void {
     make('p', {}, advice(error, text, url)));
 }
 
+const statusOf = (text: string): number => Number(/found status (\d+)/.exec(text)?.[1] ?? 0);
+const isMissing = (text: string): boolean => [404, 410].includes(statusOf(text)) || /not found/i.test(text);
+
 /** What a visitor reads, as the element `<texmesh-viewer>` says it. */
 function sentence(error: unknown, text: string): string {
   if (error instanceof FormatError) return 'This object cannot be shown.';
   if (/webgl/i.test(text)) return 'This browser cannot show objects in 3D.';
-  if (/404|not found/i.test(text)) return 'This object is not here any more.';
+  if (isMissing(text)) return 'This object is not here any more.';
   return 'The object did not come. Please check the connection.';
 }
 
 function headline(error: unknown, text: string): string {
   if (error instanceof FormatError) return 'This is not a package that can be shown';
   if (/webgl/i.test(text)) return 'There is no WebGL here';
-  if (/404|not found/i.test(text)) return 'There is no package here';
+  if (isMissing(text)) return 'There is no package here';
   return 'The package could not be loaded';
 }
 
@@ -47,13 +50,15 @@ function advice(error: unknown, text: string, url: string): string {
   if (/webgl/i.test(text))
     return 'This browser, or its graphics driver, gives pages no WebGL. Another browser may.';
   if (!URL.canParse(url, document.baseURI)) return 'Look at the address behind ?pkg= in the address bar.';
+  if (isMissing(text))
+    return 'Look at the address behind ?pkg= in the address bar; it is relative to this page.';
+  if (statusOf(text) >= 400)
+    return 'The server does not give the package away: its rights, its rules or its load may be the reason.';
   if (/html|K11/.test(text))
     return 'What the server sent is no package. A host that answers unknown addresses with its start page ' +
       'does so where the address is wrong.';
   if (error instanceof FormatError)
     return 'The file may be damaged, or is of a later version. texmesh verify says more.';
-  if (/404|not found/i.test(text))
-    return 'Look at the address behind ?pkg= in the address bar; it is relative to this page.';
   if (elsewhere)
     return 'It stands on another server, which must be reachable and allow this page to read ' +
       '(CORS: Access-Control-Allow-Origin).';
