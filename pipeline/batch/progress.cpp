@@ -45,12 +45,13 @@ std::string verdict(const StageExplanation& e) {
   return text;
 }
 
-/// The error as all other lines name the model: with its folder.
-std::string error_line(std::string_view model, const std::string& message) {
-  const std::size_t slash = model.rfind('/');
-  const std::string_view file = slash == model.npos ? model : model.substr(slash + 1);
-  const bool names_it = message.starts_with(std::string(file) + ":") && slash != model.npos;
-  return "error: " + (names_it ? std::string(model.substr(0, slash + 1)) : "") + message;
+/// The error as all other lines name the model: with its folder, and before the name of a file of its own.
+std::string error_line(std::string_view named, const std::string& message) {
+  const std::string model(named);
+  const std::size_t file = model.rfind('/') + 1;
+  if (message.starts_with(model + ":")) return "error: " + message;
+  const bool names_it = message.starts_with(model.substr(file) + ":");
+  return "error: " + (names_it ? model.substr(0, file) : model + ": ") + message;
 }
 
 }  // namespace

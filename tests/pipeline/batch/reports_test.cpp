@@ -135,7 +135,8 @@ TEST(Progress, ErrorsNameTheModelWithItsFolder) {
                           {"found", ""},
                           {"message",
                            message}}.dump()));
-  EXPECT_EQ(out.str(), "error: in/b.obj: no faces\nerror: b.objx: no\nerror: other.mtl: no line\n");
+  EXPECT_EQ(out.str(),
+            "error: in/b.obj: no faces\nerror: in/b.obj: b.objx: no\nerror: in/b.obj: other.mtl: no line\n");
 }
 
 TEST(Progress, PlainLinesAreLinesWithoutControlCharacters) {
