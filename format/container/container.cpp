@@ -29,7 +29,7 @@ class FileSource final : public ByteSource {
   Bytes read(std::uint64_t offset, std::uint64_t bytes) override {
     if (offset > size_ || bytes > size_ - offset)
       throw RuleError("K01", path_, "byte " + std::to_string(offset), std::to_string(bytes) + " bytes",
-                      "a file of " + std::to_string(size_) + " bytes");
+                      "a file of " + std::to_string(size_) + " bytes, which is cut off or damaged");
     Bytes out(static_cast<std::size_t>(bytes));
     if (read_at(fd_.get(), offset, out)) return out;
     if (errno == 0)
@@ -256,7 +256,7 @@ Directory read_tail(ByteSource& source) {
     throw RuleError("K01", source.name(), place, "a ZIP file", std::to_string(size) + " bytes");
   BytesIn end{std::span(bytes).last(kEndFixed), source.name() + ": " + place};
   under_rule("K01", [&] {
-    end.expect("a ZIP end record without comment as the last 22 bytes",
+    end.expect("a ZIP end record without comment as the last 22 bytes (a file that is cut off has none)",
                std::string_view("PK\5\6\0\0\0\0", 8));
   });
   Directory d;

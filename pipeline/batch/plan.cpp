@@ -160,7 +160,7 @@ std::vector<std::string> model_paths(const std::string& folder) {
               return path_less(a.substr(same), b.substr(same));
             });
   if (std::ranges::all_of(models, is_told_by_content) && std::ranges::none_of(models, holds_model))
-    throw InputError(folder, "", "a folder with models", "none");
+    throw InputError(folder, "", "a folder with models (.glb, .gltf, .obj, .ply, .stl, .zip)", "none");
   return models;
 }
 

@@ -45,12 +45,13 @@ std::string verdict(const StageExplanation& e) {
   return text;
 }
 
-/// The error as all other lines name the model: with its folder. Errors of stages and of files beside the
-/// model do not name it.
-std::string error_line(std::string_view model, const std::string& message) {
-  const std::string_view folder = model.substr(0, model.rfind('/') + 1), file = model.substr(folder.size());
-  const bool names_it = message.starts_with(std::string(file) + ":");
-  return fmt::format("error: {}{}{}", names_it ? folder : model, names_it ? "" : ": ", message);
+/// The error as all other lines name the model: with its folder, and before the name of a file of its own.
+std::string error_line(std::string_view named, const std::string& message) {
+  const std::string model(named);
+  const std::size_t file = model.rfind('/') + 1;
+  if (message.starts_with(model + ":")) return "error: " + message;
+  const bool names_it = message.starts_with(model.substr(file) + ":");
+  return "error: " + (names_it ? model.substr(0, file) : model + ": ") + message;
 }
 
 }  // namespace

@@ -121,6 +121,7 @@ struct UnpackArguments {
 };
 
 int run_unpack(const UnpackArguments& args) {
+  check_folder_name(args.folder);
   unpack_package(args.package, args.folder, {args.fragments == "files", args.force});
   return kExitOk;
 }
@@ -130,6 +131,8 @@ struct PackArguments {
 };
 
 int run_pack(const PackArguments& args) {
+  if (!args.package.ends_with(".texmesh"))
+    throw UsageError("--output", "", "a name that ends in .texmesh", args.package);
   pack_folder(args.folder, args.package);
   return kExitOk;
 }

@@ -59,7 +59,10 @@ void announce(const ViewArguments& args, const ServedFiles& files, const std::st
 }
 
 [[noreturn]] int run_view(const ViewArguments& args) {
-  if (!std::filesystem::is_directory(args.package)) PackageReader(open_store(args.package));
+  if (!std::filesystem::is_directory(args.package)) {
+    PackageReader package(open_store(args.package));
+    package.store().list();  // its end is there
+  }
   const ServedFiles files(args.package, viewer_folder(args.viewer));
   ViewServer server(files);
   const int port = server.bind(args.host, args.port);

@@ -50,7 +50,8 @@ function advice(error: unknown, text: string, url: string): string {
   if (/webgl/i.test(text))
     return 'This browser, or its graphics driver, gives pages no WebGL. Another browser may.';
   if (!URL.canParse(url, document.baseURI)) return 'Look at the address behind ?pkg= in the address bar.';
-  if (isMissing(text)) return 'Look at the address behind ?pkg= in the address bar; it is relative to this page.';
+  if (isMissing(text))
+    return 'Look at the address behind ?pkg= in the address bar; it is relative to this page.';
   if (statusOf(text) >= 400)
     return 'The server does not give the package away: its rights, its rules or its load may be the reason.';
   if (/html|K11/.test(text))

@@ -251,6 +251,11 @@ std::optional<std::size_t> model_of_archive(const std::vector<ArchivedFile>& fil
                                             const std::string& archive) {
   constexpr std::string_view kEndings[] = {".gltf", ".glb", ".obj", ".ply", ".stl"};
   using Rank = std::tuple<bool, std::ptrdiff_t, std::ptrdiff_t, bool>;  // the least is the one
+  const auto holds = [&](const char* name) {
+    return std::ranges::find(files, name, &ArchivedFile::name) != files.end();
+  };
+  if (holds("manifest.json") && holds("index.bin"))
+    throw InputError(archive, "", "a model", "a package of texmesh, which is compiled already");
   std::optional<std::size_t> best;
   std::optional<Rank> least;
   bool several = false;

@@ -67,7 +67,9 @@ ByteSpan Buffers::buffer(std::size_t index) {
   if (length > bytes.size()) {
     if (const std::string foreign = foreign_file(bytes); !foreign.empty())
       source_.fail(place, "a buffer of " + std::to_string(length) + " bytes", foreign);
-    source_.fail(place + "/byteLength", "at most " + std::to_string(bytes.size()), std::to_string(length));
+    source_.fail(place + "/byteLength",
+                 "at most " + std::to_string(bytes.size()) + " bytes (a file that is cut off has fewer)",
+                 std::to_string(length));
   }
   return bytes.first(length);
 }

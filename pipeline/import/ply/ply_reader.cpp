@@ -190,7 +190,7 @@ void PlyRows::begin(const PlyElement& element) {
   if (least > 0 && element.count > available / least)
     throw InputError(file_, "element " + element.name,
                      std::to_string(element.count) + " rows of at least " + std::to_string(least) + " bytes",
-                     std::to_string(left()) + " bytes left in the file");
+                     std::to_string(left()) + " bytes left in the file, which is cut off");
 }
 
 void PlyRows::next(PlyRow& row) {

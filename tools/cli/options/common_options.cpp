@@ -35,7 +35,8 @@ void check_folder_name(const std::string& output, const std::string& or_file) {
                                                 ".fbx",     ".usdz", ".zip",  ".tar",  ".gz",  ".7z",
                                                 ".json",    ".html", ".htm",  ".jpeg", ".jpg", ".png"};
   const std::string ending = lower_ending(output);
-  if (output.ends_with("/") || ending == or_file || std::filesystem::is_directory(output)) return;
+  const bool is_file = !or_file.empty() && output.ends_with(or_file);
+  if (output.ends_with("/") || is_file || std::filesystem::is_directory(output)) return;
   const bool nearly = ending.size() > 4 && closest_word(ending, kFiles) == kFiles[0];
   if (nearly || std::ranges::find(kFiles, ending) != std::end(kFiles))
     throw UsageError(

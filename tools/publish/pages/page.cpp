@@ -58,14 +58,18 @@ std::string readable_title(const std::string& path) {
   std::string name = last_name(path);
   if (name.ends_with(kEnding)) name.resize(name.size() - kEnding.size());
   std::string title;
-  for (const char c : name)
-    if (c != '_' && c != '-' && c != ' ')
-      title += c;
-    else if (!title.empty() && !title.ends_with(' '))
-      title += ' ';
+  const auto is_small = [](char c) { return c >= 'a' && c <= 'z'; };
+  for (const char c : name) {
+    if (c == '_' || c == '-' || c == ' ') {
+      if (!title.empty() && !title.ends_with(' ')) title += ' ';
+      continue;
+    }
+    if (c >= 'A' && c <= 'Z' && !title.empty() && is_small(title.back())) title += ' ';
+    title += c;
+  }
   if (title.ends_with(' ')) title.pop_back();
   if (title.empty()) return name;
-  if (title[0] >= 'a' && title[0] <= 'z') title[0] = static_cast<char>(title[0] - 'a' + 'A');
+  if (is_small(title[0])) title[0] = static_cast<char>(title[0] - 'a' + 'A');
   return title;
 }
 

@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <cerrno>
 #include <charconv>
+#include <cstring>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
@@ -366,10 +367,12 @@ int ViewServer::bind(const std::string& host, int port) {
     const int yes = 1;
     ::setsockopt(socket, SOL_SOCKET, SO_REUSEADDR, &yes, sizeof yes);
   });
+  errno = 0;
   const int bound = port == 0 ? server.bind_to_any_port(host) : server.bind_to_port(host, port) ? port : -1;
   if (bound < 0)
     throw InputError(host + ":" + std::to_string(port), "", "",
-                     "cannot be listened on: the port is in use, or the address is not this machine's");
+                     "cannot be listened on: " + (errno == 0 ? "the address is not this machine's"
+                                                             : std::string(std::strerror(errno))));
   return bound;
 }
 

@@ -4,6 +4,7 @@
 
 #include <filesystem>
 
+#include "pipeline/io/file_resolver.h"
 #include "tests/support/command.h"
 #include "tools/cli/options/common_options.h"
 #include "tools/cli/options/units.h"
@@ -55,7 +56,7 @@ TEST(Forgiving, SizesAndRatesAreReadAsPeopleWriteThem) {
 
 TEST(Forgiving, AFolderIsNotMadeUnderTheNameOfAFile) {
   const testing::TemporaryFolder folder;
-  for (const char* name : {"x.zip", "x.GLB", "x.texmsh", "x.tex-mesh", "a/b.html"})
+  for (const char* name : {"x.zip", "x.GLB", "x.TEXMESH", "x.texmsh", "x.tex-mesh", "a/b.html"})
     EXPECT_THROW(check_folder_name(name, ".texmesh"), UsageError) << name;
   EXPECT_THROW(check_folder_name("x.texmesh"), UsageError);
   for (const char* name : {"x", "x.texmesh", "x.v2", "scans.2026", "x.zip/", "", "."})
@@ -77,6 +78,13 @@ TEST(Forgiving, WhatIsNoPackageIsCalledWhatItIs) {
   dumped("PK\3\4 other", "another ZIP archive");
   dumped("", "an empty file");
   dumped("garbage", "something else");
+  const Bytes golden = read_input_file(TEXMESH_SOURCE_DIR "/tests/golden/v2.0-scan.texmesh", 1 << 24);
+  dumped(std::string(golden.begin(), golden.begin() + 3000), "cut off");
+  expect_told({"dump", folder / "."}, 1, "a folder without manifest.json");
+  expect_told({"pack", folder / ".", "-o", "x.zip"}, 2, "a name that ends in .texmesh");
+  expect_told({"unpack", "x", "-o", folder / "x.zip"}, 2, "the name of a folder");
+  expect_told({"compile", TEXMESH_SOURCE_DIR "/tests/golden/v2.0-scan.texmesh", "-o", folder / "y.texmesh"},
+              1, "which is compiled already");
 }
 
 }  // namespace texmesh::forgiving_test

@@ -46,6 +46,8 @@ TEST(RightsLine, LinksTheCreatorsPageWhereNoOtherLineIsAskedFor) {
 TEST(ReadableTitle, IsWhatPeopleWouldWrite) {
   EXPECT_EQ(readable_title("packages/apple_food-01.texmesh"), "Apple food 01");
   EXPECT_EQ(readable_title("a/Schildkr\xc3\xb6te gro\xc3\x9f.texmesh/"), "Schildkr\xc3\xb6te gro\xc3\x9f");
+  EXPECT_EQ(readable_title("FlightHelmet.texmesh"), "Flight Helmet");
+  EXPECT_EQ(readable_title("USS_Monitor3D"), "USS Monitor3D") << "no name of a word is taken apart";
   EXPECT_EQ(readable_title("__v1.2__"), "V1.2");
   EXPECT_EQ(readable_title("-.texmesh"), "-") << "better than nothing";
 }

@@ -145,7 +145,7 @@ CollectionPage collection_page(const RunSummary& s, const std::string& poster_fo
 std::optional<PackageFace> package_face(const std::string& package) {
   try {
     PackageReader reader(open_store(package));
-    PackageFace face{reader.manifest().title, {}};
+    PackageFace face{package_title(reader), {}};
     if (const auto& poster = reader.manifest().poster)
       face.poster = reader.store().read(*poster, 0, poster->bytes);
     return face;
