@@ -11,6 +11,7 @@ namespace texmesh {
 namespace {
 
 constexpr int kLeastQuality = 75, kMostQuality = 97;  // of a JPEG
+constexpr double kSharpEnough = 0.5;                  // of the source's texels
 constexpr int kPngLevel = 1;                          // the files are read once, by the stages that follow
 
 ChartedModel kept(const ConditionedMesh& mesh, const std::vector<Material>& materials,
@@ -139,6 +140,11 @@ ChartedModel chart_model(const ConditionedMesh& mesh, const std::vector<Material
   add_info(out.notes, kRebuiltAtlasNote, "",
            "a new atlas has " + std::to_string(pages->chart_count) + " charts for " + std::to_string(charts) +
                "; coarse scales and coordinates take fewer bytes. " + kLostByRebuilding);
+  if (pages->least_share < kSharpEnough)
+    add_warning(out.notes, "atlas-blurred", "",
+                "textures show in several places: the new atlas has only " +
+                    std::to_string(static_cast<int>(100 * pages->least_share)) +
+                    " % of the texels that the surface has of them; --atlas keep has all");
   return out;
 }
 

@@ -66,6 +66,9 @@ struct AtlasPages {
   std::vector<std::uint32_t> vertex_of;  // per corner 3 t + k; kNoIndex: of no page
   std::vector<std::uint32_t> page_of;    // per triangle; kNoIndex: none
   std::uint32_t chart_count = 0;
+  // Of the texels that a class shows: a texel that two places show counts twice, and no page has room for
+  // textures that repeat often.
+  double least_share = 1;
 };
 
 /// Nothing where the pages cannot hold the charts. `most_side_px` is a multiple of 64.

@@ -85,15 +85,19 @@ std::vector<ChartWish> chart_wishes(const Mesh& mesh, const TexturedSurface& tex
   return out;
 }
 
-/// Charts keep the density of the source, as long as all of a class have no more than kMostTexels.
-void set_scales(std::vector<ChartWish>& wishes, const MaterialClasses& classes, double density) {
+/// Charts keep the density of the source, as long as all of a class have no more than kMostTexels. Returns
+/// the least share of their texels that the charts of a class keep.
+double set_scales(std::vector<ChartWish>& wishes, const MaterialClasses& classes, double density) {
   std::vector<double> texels(classes.classes.size(), 0);
   for (const ChartWish& w : wishes) texels[w.group] += w.texels * density * density;
+  double least = 1;
   for (ChartWish& w : wishes) {
     const double most = kMostTexels * classes.classes[w.group].texels;
     const double reduced = texels[w.group] > most ? most / texels[w.group] : 1;
+    least = std::min(least, reduced);
     w.scale = w.area > 0 ? density * std::sqrt(std::max(w.texels, 1.0) * reduced / w.area) : 1;
   }
+  return least;
 }
 
 double scaled_texels(const ChartWish& w) { return w.area * w.scale * w.scale; }
@@ -289,8 +293,8 @@ std::optional<AtlasPages> place_charts(const ConditionedMesh& mesh, const Materi
   if (textured.triangles.empty()) return std::nullopt;
   const SurfaceCharts charts = segment_charts(textured.surface, context, kLimits);
   std::vector<ChartWish> wishes = chart_wishes(mesh.mesh, textured, charts, classes, images);
-  set_scales(wishes, classes, density);
   AtlasPages out;
+  out.least_share = set_scales(wishes, classes, density);
   out.chart_count = charts.chart_count;
   out.vertex_of.assign(3 * mesh.mesh.triangles.size(), kNoIndex);
   out.page_of.assign(mesh.mesh.triangles.size(), kNoIndex);

@@ -226,6 +226,16 @@ TEST(Atlas, WhatNoPageHoldsIsSharedOut) {
   }
 }
 
+TEST(Atlas, WarnsOfTexturesThatRepeatMoreOftenThanItHasRoomFor) {
+  for (const float times : {1.f, 5.f}) {
+    Mesh mesh = scattered(testing::bumpy_sphere(10, 14));
+    for (Vec2f& uv : mesh.uv0) uv = uv * times;
+    const Charted c = charted(mesh, {data_material(0)}, {places(64)});
+    ASSERT_NE(c.made.images.at(0).name, "a.png");
+    EXPECT_EQ(std::ranges::count(c.made.notes, "atlas-blurred", &Note::code), times > 1) << times;
+  }
+}
+
 TEST(Atlas, StrangeModelsAreRebuiltOrKept) {
   const std::vector<Mesh> meshes = testing::strange_models();
   for (std::size_t i = 0; i < meshes.size(); ++i)

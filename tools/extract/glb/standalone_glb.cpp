@@ -518,12 +518,13 @@ std::size_t add_view(GlbParts& to, const Bytes& bytes) {
 
 namespace {
 
+constexpr std::int64_t kDefaultMaterial = -1;
+
 /// The materials that triangles have, as import counts them.
-std::vector<std::size_t> used_materials(const Json& root) {
-  std::set<std::size_t> used;
+std::vector<std::int64_t> used_materials(const Json& root) {
+  std::set<std::int64_t> used;
   for (const Json& mesh : root["meshes"])
-    for (const Json& p : mesh["primitives"])
-      if (p.contains("material")) used.insert(p["material"].get<std::size_t>());
+    for (const Json& p : mesh["primitives"]) used.insert(p.value("material", kDefaultMaterial));
   return {used.begin(), used.end()};
 }
 
@@ -547,10 +548,13 @@ StandaloneGlb plain_file(const StandaloneGlb& file, const std::string& entry, co
   ScalesOptions options;
   options.mesh_codec = MeshCodec::kNone;
   GlbParts to = read_glb(write_streamed_scale(flat, SplitStreamHead{}, options), entry);
-  const std::vector<std::size_t> materials = used_materials(from.root);
+  const std::vector<std::int64_t> materials = used_materials(from.root);
   for (Json& mesh : to.root["meshes"])
-    for (Json& p : mesh["primitives"])
-      if (!materials.empty()) p["material"] = materials.at(p.value("material", std::size_t{0}));
+    for (Json& p : mesh["primitives"]) {
+      const std::int64_t material = materials.at(p.value("material", std::size_t{0}));
+      p.erase("material");
+      if (material != kDefaultMaterial) p["material"] = material;
+    }
   Json root = from.root;
   for (const char* list : {"meshes", "accessors", "bufferViews"}) root[list] = to.root[list];
   std::size_t part = 0;  // nodes with meshes, in the order in which import makes parts of them

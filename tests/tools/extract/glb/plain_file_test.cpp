@@ -30,19 +30,24 @@ void expect_plain(const Bytes& glb, std::uint64_t triangles) {
   EXPECT_FALSE(json_of(glb).contains("extensionsRequired"));
 }
 
+testing::GltfBuilder lone_quad() {
+  testing::GltfBuilder b = testing::quad();
+  b.json["accessors"][0]["max"] = {1, 1, 0};
+  b.json["nodes"][0]["name"] = "part";
+  b.json["scenes"] = {{{"nodes", {0}}}};
+  b.json["scene"] = 0;
+  return b;
+}
+
 /// A quad with a WebP texture under Draco; its second material is the one that triangles have.
 StandaloneGlb compressed_quad() {
-  testing::GltfBuilder b = testing::quad();
+  testing::GltfBuilder b = lone_quad();
   const int image =
       b.push("images", {{"bufferView", b.view_of(testing::png_bytes(8, 8, 3))}, {"mimeType", "image/png"}});
   b.push("textures", {{"source", image}});
   b.push("materials",
          {{"pbrMetallicRoughness", {{"baseColorTexture", {{"index", 0}}}}}, {"name", "painted"}});
   b.json["meshes"][0]["primitives"][0]["material"] = 0;
-  b.json["accessors"][0]["max"] = {1, 1, 0};
-  b.json["nodes"][0]["name"] = "part";
-  b.json["scenes"] = {{{"nodes", {0}}}};
-  b.json["scene"] = 0;
   const auto parts = ProxyParts::read(b.glb(), "quad", {});
   StandaloneGlb out = parts->file({}, 0, {0.001, 0.001, 8}, {});
   out.set_images({{0, {FileImage::kWebp, encode_image(parts->maps({})[0].pixels, {FileImage::kWebp, 90})}}});
@@ -62,6 +67,25 @@ TEST(PlainFile, DracoAndWebpBecomeFloatsAndPng) {
   EXPECT_EQ(after.materials[0].name, before.materials[0].name);
   EXPECT_EQ(after.mesh.part_names, before.mesh.part_names);
   EXPECT_EQ(plain_file(compressed, "x", {}).finish(), glb);
+}
+
+TEST(PlainFile, TrianglesWithoutAMaterialHaveNoneAfterwards) {
+  for (const bool beside_others : {false, true}) {
+    testing::GltfBuilder b = lone_quad();
+    auto& primitives = b.json["meshes"][0]["primitives"];
+    if (beside_others) {
+      b.push("materials", {{"name", "painted"}});
+      auto other = primitives[0];
+      other["material"] = 0;
+      primitives.push_back(other);
+    }
+    const StandaloneGlb file(b.glb(), "quad", GlbRules::kStandalone);
+    const Bytes glb = plain_file(file, "x", {}).finish();
+    expect_plain(glb, beside_others ? 4 : 2);
+    const auto found = json_of(glb)["meshes"][0]["primitives"];
+    EXPECT_FALSE(found[0].contains("material"));
+    if (beside_others) EXPECT_EQ(found.at(1)["material"], 0);
+  }
 }
 
 TEST(PlainFile, ScalesAndProxiesOfAPackageArePlainWhereItIsAsked) {
