@@ -2,6 +2,7 @@
 // of collections; then the part of them that is one shard's.
 #include "pipeline/batch/plan.h"
 
+#include <fmt/format.h>
 #include <fnmatch.h>
 
 #include <fstream>
@@ -46,27 +47,49 @@ std::size_t prefix_bytes(const std::string& folder) {
   return folder.size() + (folder.ends_with('/') ? 0 : 1);
 }
 
+/// By its name: a scan in a format that texmesh does not read.
+bool is_other_model(const std::string& path) {
+  static constexpr std::string_view kEndings[] = {".3ds",  ".abc",  ".blend", ".dae", ".e57", ".fbx", ".las",
+                                                  ".laz",  ".max",  ".ma",    ".mb",  ".off", ".usd", ".usda",
+                                                  ".usdc", ".usdz", ".vrml",  ".wrl", ".x3d"};
+  return std::ranges::find(kEndings, lower_ending(path)) != std::end(kEndings);
+}
+
+[[noreturn]] void fail_listing(const std::string& path, const std::error_code& ec) {
+  const std::string found = "cannot be listed: " + ec.message();
+  if (ec == std::errc::permission_denied) throw PermissionError(path, "", "", found);
+  throw InputError(path, "", "", found);
+}
+
 /// Paths as this process can open them, in the order of list_models().
-std::vector<std::string> model_paths(const std::string& folder) {
+std::vector<std::string> model_paths(const std::string& folder, Notes* notes) {
   std::error_code ec;
   fs::recursive_directory_iterator it(folder, ec), end;
-  if (ec) throw InputError(folder, "", "", "cannot be read: " + ec.message());
-  std::vector<std::string> models;
+  if (ec) fail_listing(folder, ec);
+  std::vector<std::string> models, others;
   while (it != end) {
     std::string path = it->path().string();
     if (it->path().filename().string().front() == '.')
       it.disable_recursion_pending();
     else if (it->is_regular_file(ec) && may_be_model(path))
       models.push_back(path);
+    else if (is_other_model(path))
+      others.push_back(path.substr(prefix_bytes(folder)));
     it.increment(ec);  // a folder that is left out without a word is a collection without its models
-    if (ec) throw InputError(path, "", "", "cannot be listed: " + ec.message());
+    if (ec) fail_listing(path, ec);
   }
   std::sort(models.begin(), models.end(),
             [same = prefix_bytes(folder)](std::string_view a, std::string_view b) {
               return path_less(a.substr(same), b.substr(same));
             });
   if (std::ranges::all_of(models, is_told_by_content) && std::ranges::none_of(models, holds_model))
-    throw InputError(folder, "", "a folder with models (.glb, .gltf, .obj, .ply, .stl, .zip)", "none");
+    throw InputError(folder, "", "a folder with models (.glb, .gltf, .obj, .ply, .stl, .zip)",
+                     others.empty() ? "none" : "none, but " + *std::ranges::min_element(others));
+  if (notes && !others.empty())
+    notes->push_back({Severity::kWarning, "other-formats", folder,
+                      fmt::format("{} of formats that texmesh does not read {} left out, {} among them",
+                                  others.size() == 1 ? "1 file" : fmt::format("{} files", others.size()),
+                                  others.size() == 1 ? "is" : "are", *std::ranges::min_element(others))});
   return models;
 }
 
@@ -319,7 +342,9 @@ void add_collection(const std::string& file, const PlanRequest& request, const C
                     Profiles& profiles, BatchPlan& plan) {
   const auto bytes = read_input_file(file, kMaxFileBytes);
   const fs::path folder = fs::path(file).parent_path();
-  const auto list = [&](const std::string& name) { return list_models((folder / name).string()); };
+  const auto list = [&](const std::string& name) {
+    return list_models((folder / name).string(), &plan.notes);
+  };
   plan.files.push_back(file);
   const auto read_notes = [&](const std::string& name) {
     plan.files.push_back((folder / name).string());
@@ -474,20 +499,20 @@ bool holds_model(const std::string& path) {
   return head.find("\"cylindrical-range-scan\"") != std::string::npos;
 }
 
-std::vector<std::string> list_models(const std::string& folder) {
-  std::vector<std::string> models = model_paths(folder);
+std::vector<std::string> list_models(const std::string& folder, Notes* notes) {
+  std::vector<std::string> models = model_paths(folder, notes);
   for (std::string& path : models) path.erase(0, prefix_bytes(folder));
   return models;
 }
 
 std::vector<ModelPath> find_models(const std::vector<std::string>& inputs, const std::string& output,
-                                   PackageNames names) {
+                                   PackageNames names, Notes* notes) {
   std::vector<Found> found;
   bool any_folder = false;
   for (const std::string& input : inputs) {
     if (fs::is_directory(input)) {
       any_folder = true;
-      for (std::string& path : model_paths(input)) {
+      for (std::string& path : model_paths(input, notes)) {
         const bool unread = is_told_by_content(path);
         found.push_back({std::move(path), prefix_bytes(input), unread});
       }
@@ -552,7 +577,7 @@ BatchPlan plan_collection(const PlanRequest& request) {
     throw InputError(request.output, "", "a folder for the packages of a collection",
                      "the name of one package");
   if (!others.empty()) {
-    std::vector<ModelPath> found = find_models(others, request.output, request.names);
+    std::vector<ModelPath> found = find_models(others, request.output, request.names, &plan.notes);
     plan.models.reserve(plan.models.size() + found.size());
     const bool alone = request.inputs.size() == 1 && names_package;
     for (ModelPath& m : found)

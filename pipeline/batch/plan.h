@@ -50,13 +50,14 @@ struct ModelPath {
 /// package; otherwise `output` is a folder, and a model's package stands in it under the same relative path
 /// with the ending .texmesh: in the place of the model's own, or with `names` kFull behind it
 /// (a.glb.texmesh). So no other model changes a package's name. What a .json holds does not count: a shard of
-/// a run opens its own ones only. InputError for what is not there.
+/// a run opens its own ones only. `notes` get a word of scans in formats that are not read. InputError for
+/// what is not there.
 std::vector<ModelPath> find_models(const std::vector<std::string>& inputs, const std::string& output,
-                                   PackageNames names = PackageNames::kStem);
+                                   PackageNames names = PackageNames::kStem, Notes* notes = nullptr);
 
 /// The files beneath a folder that find_models finds there: paths relative to it, sorted. InputError when the
 /// folder is not there or holds no model.
-std::vector<std::string> list_models(const std::string& folder);
+std::vector<std::string> list_models(const std::string& folder, Notes* notes = nullptr);
 
 /// By its name: only what it holds tells whether it is a model.
 bool is_told_by_content(const std::string& path);
@@ -120,7 +121,7 @@ struct PlanRequest {
 struct BatchPlan {
   std::vector<PlannedModel> models;
   std::vector<std::string> files;  // collections, and notes they name: a make-style rule depends on them
-  Notes notes;                     // of what is left out of these notes
+  Notes notes;                     // of what is left out of these notes, and files that are no models
   std::vector<std::string>
       folders;          // that the command line or a collection stands for, with a slash at the end
   std::string outputs;  // absolute path of the output folder, or of the package where there can be one only

@@ -7,6 +7,7 @@
 #include <map>
 
 #include "format/base/errors.h"
+#include "pipeline/io/resolver.h"
 #include "tests/support/command.h"
 
 namespace texmesh::find_models_test {
@@ -44,8 +45,25 @@ TEST(FindModels, AFolderThatCannotBeListedIsAnError) {
   fs::create_directories(folder / "closed");
   write_text(folder / "a.glb", "x");
   ::chmod((folder / "closed").c_str(), 0);
-  EXPECT_THROW(list_models(folder.path().string()), InputError);
+  EXPECT_THROW(list_models(folder.path().string()), PermissionError);
   ::chmod((folder / "closed").c_str(), 0700);
+}
+
+TEST(FindModels, ScansInFormatsThatAreNotReadAreTold) {
+  const TemporaryFolder folder;
+  for (const char* f : {"a.FBX", "notes.txt", "z.usdz"}) write_text(folder / f, "x");
+  try {
+    list_models(folder.path().string());
+    ADD_FAILURE();
+  } catch (const InputError& e) {
+    EXPECT_EQ(e.found(), "none, but a.FBX");
+  }
+  write_text(folder / "a.glb", "x");
+  Notes notes;
+  EXPECT_EQ(list_models(folder.path().string(), &notes), std::vector<std::string>{"a.glb"});
+  ASSERT_EQ(notes.size(), 1u);
+  EXPECT_EQ(notes[0].place, folder.path().string());
+  EXPECT_EQ(notes[0].text, "2 files of formats that texmesh does not read are left out, a.FBX among them");
 }
 
 TEST(FindModels, FoldersKeepTheirTreeAndSkipWhatIsNoModel) {

@@ -1,11 +1,13 @@
 #pragma once
 #include <chrono>
 #include <condition_variable>
+#include <map>
 #include <mutex>
 #include <ostream>
 #include <thread>
 
-#include "pipeline/batch/plan.h"
+#include "format/base/note.h"
+#include "pipeline/batch/fleet/shard.h"
 
 namespace texmesh {
 
