@@ -42,7 +42,7 @@ if(TEXMESH_COMPILER)
     endif()
   endforeach()
   # Of pipeline and tools what a program calls, and what those headers name; tests/house/check_install sees that none misses.
-  texmesh_install_headers(pipeline "import/import\\.h" "compile/(compile_model|options)\\.h" "batch/(plan|progress|run)\\.h"
+  texmesh_install_headers(pipeline "import/import\\.h" "compile/(compile_model|options)\\.h" "batch/(plan|progress|run|fleet/shard)\\.h"
     "cache/(disk_store|cache_layer)\\.h" "io/(file_resolver|file_stamp|new_folder|record|resolver|uri)\\.h" "compile/workers/(sandbox|worker)\\.h"
     "graph/(graph_run|stage|store)\\.h")
   texmesh_install_headers(tools "inspect/(dump/dump|verify/verify|diff/diff|notes_count)\\.h" "extract/extract\\.h" "publish/export/export\\.h"

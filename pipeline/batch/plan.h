@@ -56,7 +56,7 @@ std::vector<ModelPath> find_models(const std::vector<std::string>& inputs, const
                                    PackageNames names = PackageNames::kStem, Notes* notes = nullptr);
 
 /// The files beneath a folder that find_models finds there: paths relative to it, sorted. InputError when the
-/// folder is not there or holds no model.
+/// folder is not there or holds no model, Error when this user may not list it.
 std::vector<std::string> list_models(const std::string& folder, Notes* notes = nullptr);
 
 /// By its name: only what it holds tells whether it is a model.

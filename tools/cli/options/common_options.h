@@ -2,6 +2,7 @@
 #include <chrono>
 #include <condition_variable>
 #include <map>
+#include <memory>
 #include <mutex>
 #include <ostream>
 #include <thread>

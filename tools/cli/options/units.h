@@ -3,7 +3,6 @@
 #include <vector>
 
 #include "format/base/errors.h"
-#include "pipeline/io/resolver.h"
 
 namespace texmesh {
 
@@ -12,14 +11,11 @@ struct UsageError : InputError {
   using InputError::InputError;
 };
 
-/// Runs what reads what was asked for: an InputError of it becomes a UsageError, but for rights that are
-/// missing.
+/// Runs what reads what was asked for: an InputError of it becomes a UsageError.
 template <class Run>
 auto as_usage(const Run& run) {
   try {
     return run();
-  } catch (const PermissionError&) {
-    throw;
   } catch (const InputError& e) {
     throw UsageError(e.file(), e.place(), e.expected(), e.found());
   }
