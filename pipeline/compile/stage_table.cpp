@@ -274,7 +274,7 @@ const std::map<std::string, StageTime>& stage_times() {
       {"quality", {2.3, .76, 1.2, .44}},
       {"gltf_scales", {.01, .26}},
       {"poster", {.16}},
-      {"proxies", {.01, 0, .21, .61, 8.9}},
+      {"proxies", {.4, 0, .2, .3, 8.9}},
       {"package", {.01, .06, .02}},
   };
   return times;
