@@ -14,8 +14,6 @@ namespace {
 constexpr int kMaxBrackets = 16;
 constexpr const char* kListedLicences = "https://spdx.org/licenses/";
 
-char lower_letter(char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; }
-
 bool letters_before(std::string_view a, std::string_view b) {
   return std::ranges::lexicographical_compare(a, b, {}, lower_letter, lower_letter);
 }
@@ -278,8 +276,7 @@ class MetaReader {
          "identifiers", "capture", "dates", "unit", "upAxis", "coordinateReference", "extras"});
     json.erase("$schema");
     check_nested(json);
-    if (json.contains("upAxis") && json["upAxis"].is_string())
-      for (char& c : json["upAxis"].get_ref<std::string&>()) c = lower_letter(c);
+    if (json.contains("upAxis") && json["upAxis"].is_string()) json["upAxis"] = in_lower_case(json["upAxis"]);
     replace_unit(json);
     check_licence(json);
     check_epsg(json);

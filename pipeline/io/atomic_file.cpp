@@ -124,7 +124,9 @@ void check_output_file(const std::string& path) {
   if (is_special_file(path) || std::filesystem::is_symlink(file, error)) return;
   if (std::filesystem::is_directory(file, error))
     throw InputError(path, "", "a file that can be written", "a folder");
-  if (::access(folder_of_file(path).c_str(), W_OK) != 0) fail_to_write(path, "", errno);
+  if (::access(folder_of_file(path).c_str(), W_OK) == 0) return;
+  if (errno == EACCES) throw Error(path, "", "", std::string("cannot be written: ") + std::strerror(errno));
+  fail_to_write(path, "", errno);
 }
 
 void write_output_file(const std::string& path, ByteSpan bytes, const std::string& temporary) {

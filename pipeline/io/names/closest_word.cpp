@@ -34,6 +34,11 @@ std::size_t distance(const std::string& a, const std::string& b) {
 
 }  // namespace
 
+std::string in_lower_case(std::string text) {
+  std::ranges::transform(text, text.begin(), lower_letter);
+  return text;
+}
+
 std::string_view closest_word(std::string_view written, std::span<const std::string_view> words) {
   const std::string letters = letters_of(written);
   std::string_view closest;

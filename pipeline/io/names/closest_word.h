@@ -6,6 +6,10 @@
 
 namespace texmesh {
 
+/// Of ASCII letters; others stay.
+inline char lower_letter(char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; }
+std::string in_lower_case(std::string text);
+
 /// The word that somebody who wrote `written` may have meant: by the fewest letters that are missing, too
 /// many, other or in the place of their neighbour, at most a third of them; else the first of which it is the
 /// beginning, where it has three letters. Case, blanks, - and _ do not count. Of words as close the first; ""

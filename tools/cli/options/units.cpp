@@ -11,13 +11,6 @@
 namespace texmesh {
 namespace {
 
-char lower_letter(char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; }
-
-std::string in_lower_case(std::string text) {
-  std::ranges::transform(text, text.begin(), lower_letter);
-  return text;
-}
-
 constexpr double kMostBytes = 1e18, kMost_s = 1e6, kMostRate = 1e12;
 
 /// The number that a text begins with; `end` is where it stops, 0 when there is none.

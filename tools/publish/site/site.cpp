@@ -9,6 +9,7 @@
 #include "format/rules/output_transform.h"
 #include "pipeline/batch/stale_packages.h"
 #include "pipeline/io/markup.h"
+#include "pipeline/io/names/closest_word.h"
 #include "pipeline/io/table.h"
 #include "pipeline/io/uri.h"
 #include "tools/extract/usdz/usdz.h"
@@ -21,12 +22,6 @@ namespace texmesh {
 namespace {
 
 namespace fs = std::filesystem;
-
-std::string in_lower_case(std::string text) {
-  for (char& c : text)
-    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
-  return text;
-}
 
 std::uint64_t bytes_beneath(const fs::path& path) {
   if (!fs::is_directory(path)) return fs::file_size(path);
