@@ -1,7 +1,7 @@
 #pragma once
 
 #include "format/split/split_writer.h"
-#include "stages/scales/scale_codecs.h"
+#include "stages/gltf/scale_codecs.h"
 
 namespace texmesh {
 

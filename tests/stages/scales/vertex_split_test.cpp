@@ -10,7 +10,7 @@
 #include "format/split/split_reader.h"
 #include "format/split/split_writer.h"
 #include "stages/condition/condition.h"
-#include "stages/scales/scale_codecs.h"
+#include "stages/gltf/scale_codecs.h"
 #include "stages/scales/scales.h"
 #include "stages/simplification/simplification.h"
 #include "tests/format/split/split_fixture.h"

@@ -1,4 +1,4 @@
-#include "stages/scales/scale_codecs.h"
+#include "stages/gltf/scale_codecs.h"
 
 #include <meshoptimizer.h>
 
@@ -342,6 +342,12 @@ std::size_t collapsed_triangles(const Mesh& mesh, const std::vector<Triangle>& t
 }
 
 }  // namespace
+
+bool ScaleCoding::writes_tangents(const ScalePrimitive& primitive) const {
+  if (mesh.tangents.empty() || mesh.normals.empty() || !tangents.at(primitive.material)) return false;
+  return std::all_of(primitive.wedges.begin(), primitive.wedges.end(),
+                     [&](std::uint32_t w) { return mesh.tangents[w].w != 0; });
+}
 
 CodedPrimitive code_plain(GlbWriter& writer, const ScaleCoding& coding, ScalePrimitive primitive) {
   if (coding.options.mesh_codec != MeshCodec::kNone) order_for_codec(primitive);

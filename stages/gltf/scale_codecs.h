@@ -1,6 +1,7 @@
 #pragma once
+#include "stages/data/nested_scales.h"
+#include "stages/data/scales_options.h"
 #include "stages/gltf/glb_writer.h"
-#include "stages/scales/scales.h"
 
 namespace texmesh {
 
