@@ -138,7 +138,7 @@ AtlasSample sample_atlas(const ConditionedMesh& source, const std::vector<Materi
   context.report(0.2);
   const std::vector<Curve> textures = texture_curves(finest, own, views, inner);
   context.report(0.7);
-  const Curve meshes = mesh_curve(scales, rivals.bytes_of_meshes(), own, views, untouched, inner);
+  const Curve meshes = mesh_curve(scales, estimated_mesh_bytes(scales), own, views, untouched, inner);
   for (const std::uint64_t bytes : kSampledBytes) {
     double least = 1;
     for (const auto& [mesh, loss] : meshes) {

@@ -22,7 +22,8 @@ struct ProxyPictureLoss {
   static void archive(auto& s, auto& a) { a(s.displayed_px, s.flip_mean, s.flip_p95); }
 };
 
-/// The whole object in one small file: a coarse mesh with an atlas of its own and textures baked from S_0.
+/// The whole object in one small file: a coarse mesh with an atlas of its own and textures baked from S_0, or
+/// a scale with the source's images made smaller.
 struct Proxy {
   Bytes glb;                       // glTF 2.0 binary with its pictures inside, in the mesh's local frame
   std::uint64_t target_bytes = 0;  // what it was made for

@@ -1,5 +1,7 @@
 #include "stages/gltf/scale_glb.h"
 
+#include "format/split/split_stream.h"
+
 namespace texmesh {
 namespace {
 
@@ -62,7 +64,15 @@ class TextureTable {
   }
   std::size_t texture(std::size_t image, std::size_t sampler) {
     const auto [it, fresh] = textures_.try_emplace({image, sampler}, textures_.size());
-    if (fresh) writer_.array("textures").push_back({{"sampler", sampler}, {"source", image}});
+    if (!fresh) return it->second;
+    Json texture{{"sampler", sampler}};
+    if (writer_.array("images")[image]["mimeType"] == "image/webp") {
+      texture["extensions"]["EXT_texture_webp"]["source"] = image;
+      writer_.use_extension("EXT_texture_webp", true);
+    } else {
+      texture["source"] = image;
+    }
+    writer_.array("textures").push_back(std::move(texture));
     return it->second;
   }
   GlbWriter& writer_;
@@ -317,6 +327,24 @@ ScaleFile write_scale(const ScaleCoding& coding, const NestedScale& scale,
   write_materials(writer, materials, images, coding.write_uv[0], coding.write_uv[1]);
   file.glb = writer.finish();
   return file;
+}
+
+Mesh rounded_scale(Mesh mesh, const ScaleCoding& coding) {
+  if (coding.position.bits > 0)
+    for (Vec3f& p : mesh.positions) p = coding.position.rounded(p);
+  for (int set = 0; set < 2; ++set) {
+    const QuantisationGrid& grid = coding.uv[set];
+    if (!coding.write_uv[set] || grid.bits == 0) continue;
+    for (Vec2f& uv : set == 0 ? mesh.uv0 : mesh.uv1)
+      uv = {grid.value(grid.index(uv.x, 0), 0), grid.value(grid.index(uv.y, 1), 1)};
+  }
+  for (Vec3f& n : mesh.normals) {
+    const int bits = coding.options.normal_bits;
+    const auto [u, v] = octahedral_code({n.x, n.y, n.z}, bits);
+    const auto back = octahedral_normal(u, v, bits);
+    n = {back[0], back[1], back[2]};
+  }
+  return mesh;
 }
 
 }  // namespace texmesh

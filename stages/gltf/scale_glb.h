@@ -39,4 +39,7 @@ bool is_flat(Vec3f a, Vec3f b, Vec3f c);
 ScaleFile write_scale(const ScaleCoding& coding, const NestedScale& scale,
                       const std::vector<Material>& materials, const GlbImages& images);
 
+/// The mesh of a scale as a reader of its file gets it: on the grids, with normals of so many bits.
+Mesh rounded_scale(Mesh mesh, const ScaleCoding& coding);
+
 }  // namespace texmesh

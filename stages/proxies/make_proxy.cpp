@@ -9,7 +9,6 @@ namespace texmesh {
 namespace {
 
 constexpr double kJsonBytes = 1900;  // about, of a GLB with one material
-constexpr double kOver = 1.02;       // of the bytes asked for
 constexpr std::uint32_t kGutterPx = 1;
 constexpr std::uint32_t kTexelStep = 32, kLeastTexels = 32, kMostTexels = 1024;
 constexpr double kCover = 0.58;  // of an atlas' texels
@@ -126,6 +125,7 @@ RenderMaterial proxy_material(const MaterialGroup& group, const ProxyPictures& p
   const auto use = [&](TextureUse slot, std::int32_t texture) {
     out.slot(slot).texture = texture;
     out.slot(slot).wrap_s = out.slot(slot).wrap_t = Wrap::kClamp;
+    if (!pictures.mip_levels) out.slot(slot).min_filter = MinFilter::kLinear;
   };
   out.unlit = group.unlit, out.double_sided = group.double_sided, out.alpha_mode = group.alpha_mode;
   out.metallic = pictures.metallic, out.roughness = pictures.roughness;
@@ -202,7 +202,7 @@ std::optional<MadeProxy> finish_proxy(BakedProxy& baked, const MaterialGroups& a
   MadeProxy out;
   out.quality = pictures.quality;
   out.proxy.glb = proxy_glb(mesh, groups, pictures);
-  if (static_cast<double>(out.proxy.glb.size()) > kOver * static_cast<double>(target_bytes))
+  if (static_cast<double>(out.proxy.glb.size()) > kOverAsked * static_cast<double>(target_bytes))
     return std::nullopt;
   out.proxy.target_bytes = target_bytes;
   for (const CodedGroup& g : mesh.groups) {

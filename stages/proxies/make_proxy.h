@@ -6,6 +6,8 @@
 
 namespace texmesh {
 
+inline constexpr double kOverAsked = 1.02;  // most bytes of a file, times those asked for
+
 /// A mesh with materials and textures of its own.
 struct ShownModel {
   Mesh mesh;

@@ -1,7 +1,7 @@
 #include "stages/proxies/proxies.h"
 
 #include "format/base/portable_math.h"
-#include "stages/proxies/make_proxy.h"
+#include "stages/proxies/whole/whole_scale.h"
 
 namespace texmesh {
 namespace {
@@ -10,9 +10,13 @@ constexpr std::uint32_t kLeastTriangles = 60;
 constexpr double kLeastBytesPerTriangle = 4;
 constexpr double kFirstMeshShare = 0.7, kMeshShare = 0.65, kLargeMeshShare = 0.55;
 constexpr int kFineFrom = 100000, kNormalMapPaysFrom = 100000;  // bytes
-constexpr int kOneFormFrom = 200000;  // bytes: what is known of a normal map is not questioned again
+// Bytes from which on scales are tried. A scale of the saxophone, of 2,242 charts, is plainly nearer from
+// there on (.033 for .047 at 450 kB); of a site without mip levels what is baked is nearer for longer.
+constexpr int kScaleFrom = 100000;
 constexpr int kFirstBits = 10, kBits = 11, kFineBits = 12;  // of positions
-constexpr double kOverAsked = 1.02, kMostOfSource = 0.35;
+constexpr double kMostOfSource = 0.35;
+constexpr double kMostWithScales = 0.25; // of the source, where the last one is a scale
+constexpr double kWorthIts = 0.9;        // of the FLIP of the proxy before: what a scale is kept for
 // Of the smallest size: what is loaded soon needs no other first picture.
 constexpr double kMostOfSmallSource = 0.15;
 // Of the first size: what Draco, which scales are coded by, needs for the same picture.
@@ -32,20 +36,6 @@ bool data_varies(const std::vector<RenderMaterial>& materials) {
   });
 }
 
-/// False where viewers read all base colours of the source without mip levels. A proxy read with them would
-/// look soft beside it: .060 instead of .043 for a building of 150 kB.
-bool reads_mip_levels(const std::vector<Material>& materials) {
-  bool without = false, with = false;
-  for (const Material& m : materials) {
-    const TextureRef& texture = m.base_colour_texture;
-    if (!texture.used()) continue;
-    const bool level_0 =
-        texture.minification == Minification::kLinear || texture.minification == Minification::kNearest;
-    (level_0 ? without : with) = true;
-  }
-  return with || !without;
-}
-
 /// What the first try of a size is made of.
 ProxyForm first_form(int bytes, bool first, bool data) {
   ProxyForm out;
@@ -61,6 +51,7 @@ void note_none(Notes& notes, int bytes, const std::string& why) {
 
 constexpr const char* kScaleWins = "a scale with the source's atlas looks better for the same bytes";
 constexpr const char* kWholeTakesFewer = "the whole object takes fewer";
+constexpr const char* kLittleBetter = "a scale of so many looks little better than the proxy before it";
 constexpr const char* kOfSource = "proxies take at most 35 % of the source";
 constexpr const char* kSmallSource = "the smallest proxy would take more than 15 % of the source";
 
@@ -91,7 +82,7 @@ std::vector<int> sizes_to_try(const NestedScales& scales, const std::vector<Imag
   for (const int bytes : options.sizes) {
     if (is_small)
       note_none(notes, bytes, kSmallSource);
-    else if (whole_mesh_is_small(scales, static_cast<std::uint64_t>(bytes)))
+    else if (out.empty() && whole_mesh_is_small(scales, static_cast<std::uint64_t>(bytes)))
       note_none(notes, bytes, "S_0's mesh takes few of them, so the source's atlas can stay");
     else
       out.push_back(bytes);
@@ -127,20 +118,12 @@ ProxySubject subject_of(const Mesh& mesh, const ShownMaterials& shown, const Mat
           is_smooth(mesh)};
 }
 
-/// What the last size that has tried one tells of a normal map's bytes.
-enum class NormalMap : std::uint8_t { kMayPay, kPays, kLoses };
-NormalMap worth_of_map(bool stays, double with_map, double best) {
-  constexpr double kClearly = 0.99;
-  return stays ? NormalMap::kPays : best < kClearly * with_map ? NormalMap::kLoses : NormalMap::kMayPay;
-}
-
 /// What the sizes so far tell the next one.
 struct Learned {
   ProxyCosts costs;
-  bool flat = false;  // the last proxy needs no normals
-  NormalMap normal_map = NormalMap::kMayPay;
+  bool flat = false;                // the last proxy needs no normals
   int picture_quality = 0;          // of the last proxy, 0 = not known
-  double last_bytes = 0;            // of the last size that was made, in bytes of Draco
+  double last_bytes = 0;            // of the last size that was baked, in bytes of Draco
   double last_flip = 0;             // its loss
   double all_bytes = 0;             // of those that stay
   bool smallest_loses = false;      // to a scale of as many bytes
@@ -152,7 +135,8 @@ struct Learned {
 struct Candidate {
   std::optional<MadeProxy> made;
   ProxyForm form;
-  FlipSum flip;  // at the middle height
+  FlipSum flip;           // at the middle height
+  bool is_scale = false;  // not baked
 };
 
 /// Takes the place of `best` where it looks better, worth its form.
@@ -186,7 +170,6 @@ Candidate best_of(const ProxySubject& subject, const ReferenceViews& views, Coar
                   int bytes, bool first, Learned& learned, const RunContext& context) {
   Candidate best;
   ProxyForm form = first_form(bytes, first, subject.varied);
-  const NormalMap known = bytes >= kOneFormFrom ? learned.normal_map : NormalMap::kMayPay;
   const auto bake = [&] {
     auto made = bake_proxy(subject.source, subject.groups, surfaces, learned.costs, bytes, form, context);
     if (made) made->pictures.last_quality = learned.picture_quality;
@@ -195,27 +178,18 @@ Candidate best_of(const ProxySubject& subject, const ReferenceViews& views, Coar
   const auto try_form = [&](BakedProxy& baked) {
     compete(subject, views, baked, static_cast<std::uint64_t>(bytes), form, best, context);
   };
-  form.maps.normal = subject.mapped && bytes >= kNormalMapPaysFrom && known != NormalMap::kLoses;
+  form.maps.normal = subject.mapped && bytes >= kNormalMapPaysFrom;
   auto baked = bake();
   if (!baked) return best;
-  double with_map = 0;
-  if (form.maps.normal) {
-    try_form(*baked);
-    with_map = best.flip.mean();
-  }
-  if (!form.maps.normal || known != NormalMap::kPays) {
-    form.maps.normal = false;
-    try_form(*baked);
-    form.normals = false;
-    if (may_be_flat(subject, *baked, bytes, first, learned.flat)) try_form(*baked);
-  }
+  if (form.maps.normal) try_form(*baked);
+  form.maps.normal = false;
+  try_form(*baked);
+  form.normals = false;
+  if (may_be_flat(subject, *baked, bytes, first, learned.flat)) try_form(*baked);
   if (best.made)
     if (const auto bits = texel_bits_of(*best.made)) learned.costs.texel_bits = *bits;
   learned.flat = best.made && !best.form.normals;
-  if (best.made) {
-    learned.picture_quality = best.made->quality;
-    if (with_map > 0) learned.normal_map = worth_of_map(best.form.maps.normal, with_map, best.flip.mean());
-  }
+  if (best.made) learned.picture_quality = best.made->quality;
   if (first && learned.flat)
     if (auto again = bake()) try_form(*again);
   return best;
@@ -230,61 +204,111 @@ bool cannot_win(CompetingScales& scales, int bytes, const Learned& learned, cons
   return scales.likeliest_wins(static_cast<std::uint64_t>(bytes), best, learned.prices, context);
 }
 
-/// A proxy that stays, with its loss at the middle height.
+/// A proxy that stays, with its losses at two heights.
 struct KeptProxy {
   MadeProxy made;
-  FlipSum middle;
+  FlipSum middle, large;
 };
 
-/// Tries one size after the other, smallest first; what does not stay has a note.
-std::vector<KeptProxy> kept_proxies(const ProxySubject& subject, const NestedScales& scales,
-                                    const std::vector<int>& sizes, Notes& notes, const RunContext& inner,
-                                    const RunContext& context) {
-  CoarseSurfaces surfaces(subject.mesh, subject.groups, kLeastTriangles,
-                          most_triangles(subject.mesh, sizes.back()), inner);
-  const ReferenceViews views = reference_views(subject.mesh, subject.shown, kMiddlePx, inner);
-  CompetingScales competitors(scales, subject.shown, views);
-  const bool scales_compete = subject.mode == ProxyMode::kAuto;
-  std::vector<KeptProxy> kept;
-  Learned learned;
+/// Tries one size after the other, smallest first.
+class ProxySizes {
+ public:
+  ProxySizes(const ProxySubject& subject, const WholeScaleSource& source, const std::vector<int>& sizes,
+             const RunContext& context)
+      : subject_(subject),
+        context_(context),
+        surfaces_(subject.mesh, subject.groups, kLeastTriangles, most_triangles(subject.mesh, sizes.back()),
+                  context),
+        middle_(reference_views(subject.mesh, subject.shown, kMiddlePx, context)),
+        large_(reference_views(subject.mesh, subject.shown, kLargePx, context)),
+        scales_(source, sizes.back()),
+        competitors_(source.scales, subject.shown, middle_) {}
+
   /// Why the size gets no proxy; null where it does.
-  const auto add = [&](int bytes) -> const char* {
-    const bool first = kept.empty();
-    if (learned.holds_whole_object) return kWholeTakesFewer;
-    if (learned.all_bytes + kOverAsked * bytes > subject.most_bytes) return kOfSource;
-    if (!first && scales_compete && cannot_win(competitors, bytes, learned, inner)) return kScaleWins;
-    Candidate best = best_of(subject, views, surfaces, bytes, first, learned, inner);
-    if (!best.made) return "mesh and pictures do not fit";
-    const std::size_t size = best.made->proxy.glb.size();
-    learned.holds_whole_object = !first && size <= kept.back().made.proxy.glb.size();
-    if (learned.holds_whole_object) return kWholeTakesFewer;
-    const double flip = best.flip.mean(), share = first ? kFirstShare : 1;
-    learned.last_bytes = share * bytes, learned.last_flip = flip;
-    const auto rival_bytes = static_cast<std::uint64_t>(share * static_cast<double>(size));
-    const bool loses = scales_compete && competitors.win(rival_bytes, flip, learned.prices, inner);
-    if (loses && !first) return kScaleWins;
-    if (first) learned.smallest_loses = loses;
-    // Where the smallest one loses, larger ones must be worth its bytes, too.
-    if (first && !loses) learned.prices = competitors.prices_in_plans();
-    learned.all_bytes += static_cast<double>(size);
-    kept.push_back({std::move(*best.made), best.flip});
-    return nullptr;
-  };
-  // A size takes about as long as its square root says; pictures of those that stay come after them.
-  constexpr double kForSizes = .9;
-  double done = 0, all = 0;
-  for (const int bytes : sizes) all += std::sqrt(bytes);
-  for (std::size_t i = 0; i < sizes.size(); ++i) {
-    if (const char* why = add(sizes[i])) note_none(notes, sizes[i], why);
-    done += std::sqrt(sizes[i]);
-    context.report(kForSizes * done / all);
+  const char* add(int bytes);
+  /// Proxies that stay. A smallest one that loses goes with those that it is shown before.
+  std::vector<KeptProxy> kept(Notes& notes) &&;
+
+ private:
+  FlipSum flip_of(const MadeProxy& made, const ReferenceViews& views) const {
+    return picture_loss(views, made.shown.scene(), made.shown.shown.textures, context_);
   }
-  // A smallest proxy that loses goes with those that it is shown before.
-  if (learned.smallest_loses && kept.size() == 1) {
-    note_none(notes, static_cast<int>(kept.front().made.proxy.target_bytes), kScaleWins);
-    kept.clear();
+  Candidate best_candidate(int bytes);
+  const char* why_not(const Candidate& best, const FlipSum& large);
+  bool scales_compete() const { return subject_.mode == ProxyMode::kAuto; }
+
+  const ProxySubject& subject_;
+  const RunContext& context_;
+  CoarseSurfaces surfaces_;
+  const ReferenceViews middle_, large_;
+  WholeScales scales_;
+  CompetingScales competitors_;
+  std::vector<KeptProxy> kept_;
+  Learned learned_;
+};
+
+/// A scale or baked, by pictures in which both show their texels. Bakes only what may be nearer: FLIP of six
+/// scans' proxies falls with at most this power of the bytes.
+Candidate ProxySizes::best_candidate(int bytes) {
+  constexpr double kMostPower = 0.63;
+  const bool first = kept_.empty();
+  Candidate scale;
+  if (bytes >= kScaleFrom && !first) scale.made = scales_.of(static_cast<std::uint64_t>(bytes), context_);
+  if (scale.made) {
+    scale.is_scale = true;
+    scale.flip = flip_of(*scale.made, middle_);
+    const double share = learned_.last_bytes / bytes;
+    if (learned_.last_flip * portable::pow(share, kMostPower) > scale.flip.mean()) return scale;
   }
-  return kept;
+  Candidate baked = best_of(subject_, middle_, surfaces_, bytes, first, learned_, context_);
+  if (!baked.made) return scale;
+  learned_.last_bytes = (first ? kFirstShare : 1) * bytes, learned_.last_flip = baked.flip.mean();
+  const bool is_nearer =
+      scale.made && flip_of(*scale.made, large_).mean() < flip_of(*baked.made, large_).mean();
+  return is_nearer ? std::move(scale) : std::move(baked);
+}
+
+/// Why the candidate does not stay; null where it does. Plans code a scale's texels apart and pay for tables,
+/// so no plan of the bytes shows what a file of a scale shows.
+const char* ProxySizes::why_not(const Candidate& best, const FlipSum& large) {
+  const bool first = kept_.empty();
+  const auto size = static_cast<double>(best.made->proxy.glb.size());
+  learned_.holds_whole_object = !first && size <= static_cast<double>(kept_.back().made.proxy.glb.size());
+  if (learned_.holds_whole_object) return kWholeTakesFewer;
+  if (!scales_compete()) return nullptr;
+  if (best.is_scale) {
+    if (learned_.all_bytes + size > kMostWithScales / kMostOfSource * subject_.most_bytes) return kOfSource;
+    return large.mean() > kWorthIts * kept_.back().large.mean() ? kLittleBetter : nullptr;
+  }
+  const auto rival_bytes = static_cast<std::uint64_t>((first ? kFirstShare : 1) * size);
+  const bool loses = competitors_.win(rival_bytes, best.flip.mean(), learned_.prices, context_);
+  if (first) learned_.smallest_loses = loses;
+  // Where the smallest one loses, larger ones must be worth its bytes, too.
+  if (first && !loses) learned_.prices = competitors_.prices_in_plans();
+  return loses && !first ? kScaleWins : nullptr;
+}
+
+const char* ProxySizes::add(int bytes) {
+  if (learned_.holds_whole_object) return kWholeTakesFewer;
+  if (learned_.all_bytes + kOverAsked * bytes > subject_.most_bytes) return kOfSource;
+  if (!kept_.empty() && bytes < kScaleFrom && scales_compete() &&
+      cannot_win(competitors_, bytes, learned_, context_))
+    return kScaleWins;
+  Candidate best = best_candidate(bytes);
+  if (!best.made) return "mesh and pictures do not fit";
+  FlipSum large = flip_of(*best.made, large_);
+  if (const char* why = why_not(best, large)) return why;
+  learned_.all_bytes += static_cast<double>(best.made->proxy.glb.size());
+  kept_.push_back({std::move(*best.made), best.flip, std::move(large)});
+  return nullptr;
+}
+
+std::vector<KeptProxy> ProxySizes::kept(Notes& notes) && {
+  if (learned_.smallest_loses && kept_.size() == 1) {
+    note_none(notes, static_cast<int>(kept_.front().made.proxy.target_bytes), kScaleWins);
+    kept_.clear();
+  }
+  return std::move(kept_);
 }
 
 /// The proxies with their losses at all displayed heights.
@@ -292,16 +316,14 @@ std::vector<Proxy> measured_proxies(const ProxySubject& subject, std::vector<Kep
                                     const RunContext& context) {
   std::vector<Proxy> out;
   for (KeptProxy& k : kept) out.push_back(std::move(k.made.proxy));
-  for (const double px : {kSmallPx, kMiddlePx, kLargePx}) {
-    const bool known = px == kMiddlePx;
-    ReferenceViews views;
-    if (!known && !kept.empty()) views = reference_views(subject.mesh, subject.shown, px, context);
-    for (std::size_t i = 0; i < kept.size(); ++i) {
-      const ShownModel& shown = kept[i].made.shown;
-      const FlipSum flip =
-          known ? kept[i].middle : picture_loss(views, shown.scene(), shown.shown.textures, context);
-      out[i].losses.push_back({px, flip.mean(), flip.percentile(0.95)});
-    }
+  ReferenceViews small;
+  if (!kept.empty()) small = reference_views(subject.mesh, subject.shown, kSmallPx, context);
+  for (std::size_t i = 0; i < kept.size(); ++i) {
+    const ShownModel& shown = kept[i].made.shown;
+    const FlipSum at_small = picture_loss(small, shown.scene(), shown.shown.textures, context);
+    const std::array<std::pair<double, FlipSum>, 3> sums{
+        {{kSmallPx, at_small}, {kMiddlePx, kept[i].middle}, {kLargePx, kept[i].large}}};
+    for (const auto& [px, flip] : sums) out[i].losses.push_back({px, flip.mean(), flip.percentile(0.95)});
   }
   return out;
 }
@@ -331,8 +353,17 @@ Proxies make_proxies(const NestedScales& scales, const std::vector<Material>& ma
   }
   const ProxySubject subject =
       subject_of(mesh, shown, groups, source, options.mode, most_bytes(scales, images, options.mode));
-  out.proxies =
-      measured_proxies(subject, kept_proxies(subject, scales, sizes, out.notes, inner, context), inner);
+  ProxySizes tried(subject, {scales, materials, images, mesh, shown}, sizes, inner);
+  // A size takes about as long as its square root says; pictures of those that stay come after them.
+  constexpr double kForSizes = .9;
+  double done = 0, all = 0;
+  for (const int bytes : sizes) all += std::sqrt(bytes);
+  for (const int bytes : sizes) {
+    if (const char* why = tried.add(bytes)) note_none(out.notes, bytes, why);
+    done += std::sqrt(bytes);
+    context.report(kForSizes * done / all);
+  }
+  out.proxies = measured_proxies(subject, std::move(tried).kept(out.notes), inner);
   return out;
 }
 

@@ -31,6 +31,13 @@ std::size_t kept_from(const RenderTexture& texture, std::size_t dropped) {
   return std::min(dropped, texture.levels.size() - 1);
 }
 
+/// Others in each view.
+std::vector<std::uint8_t> quarter_of_bands(std::uint32_t side_px, int view) {
+  std::vector<std::uint8_t> out((side_px + kBandPx - 1) / kBandPx);
+  for (std::size_t b = 0; b < out.size(); ++b) out[b] = b % 4 == static_cast<std::size_t>(1 + view) % 4;
+  return out;
+}
+
 /// How many of their finest levels textures are shown without, so that the others cost no more.
 std::size_t affordable(const std::vector<RenderTexture>& textures, double bytes, double bits_per_texel) {
   for (std::size_t dropped = 0;; ++dropped) {
@@ -60,14 +67,27 @@ std::vector<RenderTexture> without_finest(const std::vector<RenderTexture>& text
   return out;
 }
 
+bool reads_mip_levels(const std::vector<Material>& materials) {
+  bool without = false, with = false;
+  for (const Material& m : materials) {
+    const TextureRef& texture = m.base_colour_texture;
+    if (!texture.used()) continue;
+    const bool level_0 =
+        texture.minification == Minification::kLinear || texture.minification == Minification::kNearest;
+    (level_0 ? without : with) = true;
+  }
+  return with || !without;
+}
+
 std::uint32_t enough_side_px(const std::vector<Material>& materials) {
+  if (!reads_mip_levels(materials)) return std::numeric_limits<std::uint32_t>::max();
   std::size_t used = 0;
   for (const Material& m : materials) for_each_texture(m, [&](const TextureRef& t) { used += t.used(); });
   return used > 64 ? 256 : used > 24 ? 512 : used > 8 ? 1024 : 2048;
 }
 
 ReferenceViews reference_views(const Mesh& mesh, const ShownMaterials& shown, double displayed_px,
-                               const RunContext& context) {
+                               const RunContext& context, bool quarter) {
   ReferenceViews out{studio_environment(), {}};
   const double extent = to_double(bounding_box(mesh.positions)).longest_side();
   const BoundingSphere sphere = bounding_sphere(mesh.positions);
@@ -80,8 +100,8 @@ ReferenceViews reference_views(const Mesh& mesh, const ShownMaterials& shown, do
     const double side = displayed_px * 2 * distance * view.camera.tan_half_fov / extent;
     view.side_px = static_cast<std::uint32_t>(std::clamp(std::ceil(side), 1.0, 8192.0));
     view.camera.tan_half_fov *= view.side_px / std::clamp(side, 0.5, 8192.0);
-    const Picture picture = shade(scene, look(scene, view.camera, view.side_px, context), shown.textures,
-                                  out.environment, context);
+    if (quarter) view.bands = quarter_of_bands(view.side_px, v);
+    const Picture picture = shade(scene, view.seen(scene, context), shown.textures, out.environment, context);
     view.picture = prepare_flip(picture);  // what was seen is gone by now
     out.views.push_back(std::move(view));
   }
@@ -94,11 +114,18 @@ FlipSum picture_loss(const ReferenceViews& reference, const RenderScene& scene,
   const std::vector<ReferenceViews::View>& all = reference.views;
   for (std::size_t v = 0; v < all.size(); ++v) {
     if (2 * v >= all.size() && sum.mean() > hopeless) break;
-    const Picture picture = shade(scene, look(scene, all[v].camera, all[v].side_px, context), textures,
-                                  reference.environment, context);
+    const Picture picture =
+        shade(scene, all[v].seen(scene, context), textures, reference.environment, context);
     sum.add(compare_flip(all[v].picture, prepare_flip(picture)));
   }
   return sum;
+}
+
+std::vector<double> estimated_mesh_bytes(const NestedScales& scales) {
+  std::vector<std::uint8_t> used;
+  std::vector<double> out;
+  for (std::size_t k = 0; k < scales.scales.size(); ++k) out.push_back(mesh_bytes(scales, k, used));
+  return out;
 }
 
 double whole_mesh_bytes(const NestedScales& scales) {
@@ -116,10 +143,7 @@ bool whole_mesh_is_small(const NestedScales& scales, std::uint64_t bytes) {
 
 CompetingScales::CompetingScales(const NestedScales& scales, const ShownMaterials& shown,
                                  const ReferenceViews& views)
-    : scales_(scales), shown_(shown), views_(views) {
-  std::vector<std::uint8_t> used;
-  for (std::size_t k = 0; k < scales.scales.size(); ++k) mesh_bytes_.push_back(mesh_bytes(scales, k, used));
-}
+    : scales_(scales), shown_(shown), views_(views), mesh_bytes_(estimated_mesh_bytes(scales)) {}
 
 RivalPrices CompetingScales::prices_in_plans() const {
   // Of plans of 200 to 500 kB of four scans. At 512 px they lose more by coding than pictures of half the

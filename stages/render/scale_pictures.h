@@ -7,7 +7,12 @@
 
 namespace texmesh {
 
+/// False where viewers read all base colours of the source without mip levels. A proxy read with them would
+/// look soft beside it: .060 instead of .043 for a building of 150 kB.
+bool reads_mip_levels(const std::vector<Material>& materials);
+
 /// Sides of textures, as finer ones show nothing more in small pictures of a model of these materials.
+/// Without mip levels they all show.
 std::uint32_t enough_side_px(const std::vector<Material>& materials);
 
 /// Displayed heights of the longest side of the bounding box.
@@ -18,13 +23,18 @@ struct ReferenceViews {
   struct View {
     RenderCamera camera;
     std::uint32_t side_px = 0;
+    std::vector<std::uint8_t> bands;  // as look() takes them; empty: all
     FlipPicture picture;
+    Visibility seen(const RenderScene& scene, const RunContext& context) const {
+      return look(scene, camera, side_px, context, bands);
+    }
   };
   RenderEnvironment environment;
   std::vector<View> views;
 };
+/// `quarter`: only a quarter of the rows is there, spread over the pictures.
 ReferenceViews reference_views(const Mesh& mesh, const ShownMaterials& shown, double displayed_px,
-                               const RunContext& context);
+                               const RunContext& context, bool quarter = false);
 
 /// What pictures of the scene from the same places differ by. Half of the views will do where their mean is
 /// more than `hopeless`.
@@ -58,8 +68,6 @@ class CompetingScales {
   /// What plans of a package with proxies pay for a scale that looks like those: besides mesh and textures
   /// they take tables and the coarsest scale's mesh, with which materials come.
   RivalPrices prices_in_plans() const;
-  /// Of scales, coded by Draco, about.
-  const std::vector<double>& bytes_of_meshes() const { return mesh_bytes_; }
 
  private:
   struct Competitor {
@@ -76,7 +84,9 @@ class CompetingScales {
   std::map<Competitor, double> known_;  // FLIP of all views; found once
 };
 
-/// Bytes of S_0's whole mesh, coded; within 20 % for scans.
+/// Bytes of the scales' meshes, coded by Draco as compile codes them; within 20 % for scans.
+std::vector<double> estimated_mesh_bytes(const NestedScales& scales);
+/// Those of S_0.
 double whole_mesh_bytes(const NestedScales& scales);
 
 /// Whether S_0's whole mesh, coded, leaves so much of the bytes to the source's textures that no atlas of

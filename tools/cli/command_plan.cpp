@@ -245,7 +245,7 @@ void add_plan_command(Command& app) {
       "plan plays the transfer over a model of the network and needs nothing but the package. FLIP is "
       "how much a lit picture of that height differs from one of the source, in the mean over the object: 0 "
       "= equal, 1 = as different as can be. It comes from the table that compile measured.\n"
-      "A proxy is a small file with an atlas of its own. The plan shows it if nobody can tell it from the "
+      "A proxy is the whole object in a small file. The plan shows it if nobody can tell it from the "
       "source at that height, or if it looks better than any scale in the time or the bytes. On a slow link "
       "a larger proxy may come before a scale.\n"
       "Exit code: 0, 1 when the package cannot be read, 2 usage, 4 when not even the least fits the budget.");

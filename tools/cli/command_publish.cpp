@@ -402,7 +402,7 @@ void add_extract_options(Command& c, ExtractArguments& args) {
                "This scale (texmesh dump lists the scales); default: the scale that suits --display")
           .integer_in(0, 99);
   c.option("--proxy", args.proxy,
-           "This proxy, a small file with an atlas of its own (texmesh dump lists them), as it is: 0 = the "
+           "This proxy, the whole object in a small file (texmesh dump lists them), as it is: 0 = the "
            "smallest")
       .integer_in(0, kMaxPackageProxies - 1)
       .excludes(bytes)

@@ -44,6 +44,9 @@ void add_plane(ProxyModel& model, TextureRole role, std::uint32_t side_px, auto&
         p.data.push_back(static_cast<std::uint8_t>(value(x, y, c)));
   model.fragments.planes.push_back(std::move(plane));
   model.pixels.push_back(std::move(p));
+  if (role == TextureRole::kAlpha) return;
+  Image& image = model.images.emplace_back();
+  image.width_px = image.height_px = side_px;
 }
 
 ProxyModel textured(Mesh mesh) {
@@ -109,10 +112,11 @@ TEST(Proxies, FilesStandAloneFitTheirSizesAndLookBetterWithMoreBytes) {
 }
 
 TEST(Proxies, ManyThreadsGiveTheBytesOfOne) {
-  const ProxyModel model = textured(testing::bumpy_sphere(40, 80));
-  const ProxiesOptions options{ProxyMode::kAlways, {10000, 20000}};
+  const ProxyModel model = noisy(testing::bumpy_sphere(40, 80));
+  const ProxiesOptions options{ProxyMode::kAlways, {10000, 20000, 110000}};
   const Proxies one = proxies_of(model, options, 1), eight = proxies_of(model, options, 8);
-  ASSERT_EQ(one.proxies.size(), eight.proxies.size());
+  ASSERT_EQ(one.proxies.size(), 3u);
+  ASSERT_EQ(eight.proxies.size(), 3u);
   for (std::size_t i = 0; i < one.proxies.size(); ++i) {
     EXPECT_EQ(one.proxies[i].glb, eight.proxies[i].glb);
     EXPECT_EQ(one.proxies[i].losses, eight.proxies[i].losses);
@@ -196,8 +200,9 @@ ProxyModel changed(ProxyModel model, const std::function<void(ProxyModel&)>& cha
   return model;
 }
 
-void expect_a_sound_one(const std::string& what, const ProxyModel& model) {
-  expect_sound(proxies_of(model, {ProxyMode::kAlways, {8000}}), what);
+/// One that is baked, and a larger one that may be a scale.
+void expect_sound_ones(const std::string& what, const ProxyModel& model) {
+  expect_sound(proxies_of(model, {ProxyMode::kAlways, {8000, 100000}}), what);
 }
 
 TEST(Proxies, HardMaterialsHaveAProxyOrANote) {
@@ -220,7 +225,7 @@ TEST(Proxies, HardMaterialsHaveAProxyOrANote) {
          for (const std::uint32_t p : m.mesh.wedge_position)
            m.mesh.colours.push_back({m.mesh.positions[p].x * 0.4f + 0.5f, 0.5f, 0.2f, 1});
        })}};
-  for (const auto& [what, model] : models) expect_a_sound_one(what, model);
+  for (const auto& [what, model] : models) expect_sound_ones(what, model);
 }
 
 TEST(Proxies, HardShapesHaveAProxyOrANote) {
@@ -253,7 +258,7 @@ TEST(Proxies, HardShapesHaveAProxyOrANote) {
                               for (Vec3f& p : m.mesh.positions) p = {1, 1, 1};
                             })},
       {"500 pebbles", textured(testing::side_by_side(std::vector<Mesh>(500, testing::cube())))}};
-  for (const auto& [what, model] : models) expect_a_sound_one(what, model);
+  for (const auto& [what, model] : models) expect_sound_ones(what, model);
 }
 
 TEST(Proxies, TheFirstNeedsNoDracoAndLargerOnesDo) {
@@ -276,7 +281,7 @@ TEST(Proxies, TinyMeshesKeepTheSourcesAtlas) {
 
 /// A file of so many bytes stands for the source's images.
 ProxyModel with_source(ProxyModel model, std::size_t bytes) {
-  model.images.emplace_back().bytes.resize(bytes);
+  model.images.at(0).bytes.resize(bytes);
   return model;
 }
 
@@ -308,15 +313,14 @@ Proxies proxies_of_scales(const NestedScales& scales, const ProxyModel& model, s
 }
 
 TEST(Proxies, EachSizeIsDecidedByItself) {
-  // 55 % of the first size hold no mesh; the second buys a scale with all texels, even in a plan. S_0's mesh
-  // is a small part of the third.
+  // 55 % of the first size hold no mesh. A file of a scale holds S_0 with all texels in the second, and is all
+  // that the third could hold.
   const ProxyModel model = with_source(noisy(Mesh{}), 10000000);
-  const Proxies made = proxies_of_scales(two_scales(90, 2), model, {8000, 150000, 300000});
-  ASSERT_EQ(made.proxies.size(), 1u);
+  const Proxies made = proxies_of_scales(two_scales(60, 2), model, {8000, 200000, 500000});
+  ASSERT_EQ(made.proxies.size(), 2u);
   EXPECT_EQ(made.proxies[0].target_bytes, 8000u);
-  EXPECT_EQ(notes_saying(made, "looks better for the same bytes"), 1u);
-  EXPECT_EQ(notes_saying(made, "the source's atlas can stay"), 1u);
-  EXPECT_EQ(made.notes.size(), 2u);
+  EXPECT_EQ(made.proxies[1].target_bytes, 200000u);
+  EXPECT_EQ(notes_saying(made, "the whole object takes fewer"), 1u);
 }
 
 TEST(Proxies, LargerOnesCompeteWithWhatPlansPay) {
@@ -406,6 +410,54 @@ TEST(Proxies, VertexColoursBecomeTexels) {
   const Proxies made = proxies_of(model);
   ASSERT_EQ(made.proxies.size(), 1u);
   EXPECT_LT(made.proxies[0].losses[1].flip_mean, 0.05) << "the colours are there";
+}
+
+/// A material and an image for every so many triangles.
+ProxyModel of_images(std::size_t count) {
+  ProxyModel out = noisy(testing::bumpy_sphere(40, 80));
+  while (out.pixels.size() < count) {
+    add_plane(out, TextureRole::kBaseColour, 256,
+              [&](auto x, auto y, auto c) { return x * y * (c + 1) >> 3; });
+    out.fragments.planes.back().image = static_cast<std::uint32_t>(out.pixels.size() - 1);
+    out.materials.push_back(out.materials.front());
+    out.materials.back().base_colour_texture.image = static_cast<std::int32_t>(out.pixels.size() - 1);
+  }
+  for (std::size_t t = 0; t < out.mesh.triangles.size(); ++t)
+    out.mesh.triangle_material[t] = static_cast<std::uint16_t>(t * count / out.mesh.triangles.size());
+  return out;
+}
+
+TEST(Proxies, LargeOnesAreScalesWithTheSourcesImages) {
+  const Proxies made = proxies_of(of_images(2), {ProxyMode::kAlways, {10000, 200000}});
+  expect_sound(made, "two images");
+  ASSERT_EQ(made.proxies.size(), 2u);
+  EXPECT_FALSE(says(made.proxies[0], "texture/0"));
+  const Proxy& large = made.proxies[1];
+  EXPECT_TRUE(says(large, "texture/0") && says(large, "texture/1"));
+  EXPECT_TRUE(says(large, "KHR_draco_mesh_compression"));
+  EXPECT_EQ(large.textures.size(), 2u);
+  EXPECT_LT(large.losses[2].flip_mean, made.proxies[0].losses[2].flip_mean);
+  EXPECT_GE(large.glb.size(), large.target_bytes * 95 / 100) << "the bytes are used";
+}
+
+TEST(Proxies, TheSmallestIsNoScaleForItNeedsNoDecoder) {
+  const Proxies made = proxies_of(of_images(2), {ProxyMode::kAlways, {150000}});
+  ASSERT_EQ(made.proxies.size(), 1u);
+  EXPECT_TRUE(says(made.proxies[0], "EXT_meshopt_compression"));
+}
+
+TEST(Proxies, AScaleOfMoreTexturesThanClientsCountIsNone) {
+  const Proxies made = proxies_of(of_images(5), {ProxyMode::kAlways, {10000, 100000}});
+  ASSERT_EQ(made.proxies.size(), 2u);
+  for (const Proxy& proxy : made.proxies) {
+    double texels = 0, side = 0;
+    for (const ProxyTexture& t : proxy.textures) {
+      texels += static_cast<double>(t.width_px) * t.height_px;
+      side = std::max({side, static_cast<double>(t.width_px), static_cast<double>(t.height_px)});
+    }
+    EXPECT_LE(texels, 4 * side * side);
+    EXPECT_FALSE(says(proxy, "texture/4"));
+  }
 }
 
 }  // namespace texmesh::proxies_test

@@ -240,7 +240,7 @@ Table kinds_table(const std::vector<KindBytes>& kinds, std::uint64_t sum) {
 std::string proxies_text(const Manifest& m) {
   if (m.proxies.empty()) return "";
   Table table(
-      "proxies (whole objects with an atlas of their own; mean FLIP of lit pictures at displayed heights in px)",
+      "proxies (whole objects in small files; mean FLIP of lit pictures at displayed heights in px)",
       {"proxy",
        {"triangles", kGrouped},
        {"vertices", kGrouped},

@@ -62,7 +62,7 @@ export interface ManifestScale {
 }
 /** Whether a scale has a file of its own; the others stand in the vertex-split stream alone. */
 export const hasGlb = ({ glb }: ManifestScale): boolean => glb.path !== layout.splitStreamPath;
-/** A baked version of the whole object with an atlas of its own: a GLB that stands alone. */
+/** The whole object in a small GLB that stands alone, with textures of its own. */
 export interface ManifestProxy {
   glb: EntryRef;
   triangles: number;

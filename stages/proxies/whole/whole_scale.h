@@ -1,0 +1,71 @@
+#pragma once
+// Inside the room only: a scale with the source's atlas as a proxy of a number of bytes.
+#include "stages/gltf/scale_glb.h"
+#include "stages/proxies/make_proxy.h"
+#include "stages/proxies/whole/source_textures.h"
+
+namespace texmesh {
+
+/// What files of scales are made from. All must outlive them.
+struct WholeScaleSource {
+  const NestedScales& scales;
+  const std::vector<Material>& materials;
+  const std::vector<Image>& images;
+  const Mesh& mesh;  // S_0, or what stands for it
+  const ShownMaterials& shown;
+};
+
+/// Files of scales with the source's materials, coordinates and images, which are made smaller and coded
+/// anew: meshes by KHR_draco_mesh_compression. What curves and scales lose is measured once, when it is first
+/// asked for. Same bytes for any thread count.
+class WholeScales {
+ public:
+  /// `most_bytes`: of the largest file.
+  WholeScales(const WholeScaleSource& source, double most_bytes);
+  /// The file of at most so many bytes that is likely to look best, by sums of what its mesh and its images
+  /// lose in pictures of kLargePx. Nothing where none fits.
+  std::optional<MadeProxy> of(std::uint64_t bytes, const RunContext& context);
+
+ private:
+  /// How finely a mesh is coded, 0 .. the number of kCodings - 1.
+  struct MeshChoice {
+    std::size_t scale = 0, coding = 0;
+    auto operator<=>(const MeshChoice&) const = default;
+  };
+  struct Choice {
+    MeshChoice mesh;
+    TextureCurves::Dealt textures;
+    double loss = 0;
+  };
+  struct MeshFile {
+    std::size_t bytes = 0;  // of the whole file without images
+    Mesh shown;
+  };
+  void measure(const RunContext& context);
+  double loss_of(std::size_t scale, const RunContext& context);
+  double mesh_bytes(const MeshChoice& mesh) const;
+  std::optional<Choice> best_with(std::size_t scale, double bytes, const RunContext& context);
+  std::optional<Choice> choose(double bytes, const RunContext& context);
+  ScaleCoding coding_of(const MeshChoice& mesh, const RunContext& context) const;
+  const MeshFile& mesh_file(const MeshChoice& mesh, const RunContext& context);
+  struct CodedImages {
+    GlbImages files;
+    std::vector<ProxyTexture> rows;
+    double bytes = 0;  // with what the document says of them
+  };
+  CodedImages coded_images(const TextureCurves::Dealt& dealt, int higher);
+  CodedImages filled(const TextureCurves::Dealt& dealt, double bytes);
+  std::optional<MadeProxy> finished(const Choice& choice, std::uint64_t bytes, const RunContext& context);
+
+  const WholeScaleSource source_;
+  double most_bytes_;
+  SourceTextures textures_;
+  std::optional<ReferenceViews> views_;
+  std::optional<TextureCurves> curves_;
+  std::map<std::size_t, double> scale_losses_;  // squares of FLIP, by scale
+  std::map<MeshChoice, MeshFile> files_;
+  std::vector<double> estimates_;  // of meshes' bytes, by scale
+  double of_estimate_ = 0.62;      // what a mesh of the usual coding takes of them
+};
+
+}  // namespace texmesh
