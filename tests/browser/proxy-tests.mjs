@@ -106,7 +106,7 @@ test('a proxy gives way to scales in one frame: nothing flashes, nothing moves, 
     check(after.fromLast <= before.fromLast + 0.5, `the scale is ${after.fromLast.toFixed(2)} levels from the end, the proxy was ${before.fromLast.toFixed(2)}`);
     check(page.said.length === 0, page.said.join('\n'));
   });
-}, {seconds: 120});
+}, {seconds: 120, timed: true});
 
 test('a proxy that cannot be decoded leaves the load to scales', async () => {
   const b = await common();
@@ -133,4 +133,4 @@ test('behind a link of 2 Mbit/s the proxy is the first picture, after one reques
     check(later.every((q) => q.started >= start.ended), 'something shares the link with the first picture');
     check(r.state.proxy === -1 && r.state.scale >= 0, JSON.stringify({...r.state, planes: 0}));
   });
-}, {seconds: 120});
+}, {seconds: 120, timed: true});
