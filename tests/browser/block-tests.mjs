@@ -148,4 +148,4 @@ test('blocks of every format are made in a worker, and uploads are short', async
   console.log(`         uploads: ${uploads.length}, ${ms[Math.floor(0.99 * ms.length)].toFixed(2)} ms at the 99th percentile`);
   check(ms[Math.floor(0.95 * ms.length)] <= 4, `${ms.slice(-5).join()} ms`);
   await r.page.close();
-}, {seconds: 120, timed: true});
+}, {seconds: 120});

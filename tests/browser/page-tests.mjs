@@ -80,7 +80,7 @@ test('twenty scans behind 4 Mbit/s and 40 ms: when the first pictures stand', as
     check(seconds < 30, `${seconds} s`);
     await settled(page, 20);
   }, {link: {bytesPerSecond: 500000, rttMs: 40}});
-}, {seconds: 120, timed: true});
+}, {seconds: 120});
 
 test('a page keeps within its memory: what WebGL was asked to store is what is counted', async () => {
   await onPage(html(elements(4, 'camera-controls'), 'texmesh-viewer{height:440px}.grid{grid-template-columns:1fr 1fr}'), async (page) => {

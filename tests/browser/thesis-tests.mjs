@@ -24,4 +24,4 @@ test('the policy thesis loads as printed: the JND\'s scale, F-bar first, one fra
   check(r.state.planes.every((p) => p.plane === p.base), 'a mip is shown');
   const end = r.events.find((e) => e.name === 'deadline');
   check(end && end.skipped === 0 && end.actual < 1.5 * time, JSON.stringify(end));
-}), {timed: true});
+}));
