@@ -10,7 +10,7 @@ if(TARGET texmesh AND TARGET make_scan)
 endif()
 # The web client: types, Vitest (delivery/vectors among it), build, size.
 add_test(NAME delivery_web COMMAND ${PROJECT_SOURCE_DIR}/delivery/web/run-tests ${CMAKE_CURRENT_BINARY_DIR}/delivery_web)
-set_tests_properties(delivery_web PROPERTIES SKIP_RETURN_CODE 77 TIMEOUT 600 LABELS web)
+set_tests_properties(delivery_web PROPERTIES SKIP_RETURN_CODE 77 TIMEOUT 600 LABELS web COST 100)
 if(TARGET texmesh AND TARGET make_scan)
   add_executable(compose_plane browser/compose_plane.cpp)
   target_link_libraries(compose_plane PRIVATE texmesh_stages texmesh_delivery)
