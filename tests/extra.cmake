@@ -10,7 +10,7 @@ if(TARGET texmesh AND TARGET make_scan)
 endif()
 # The web client: types, Vitest (delivery/vectors among it), build, size.
 add_test(NAME delivery_web COMMAND ${PROJECT_SOURCE_DIR}/delivery/web/run-tests ${CMAKE_CURRENT_BINARY_DIR}/delivery_web)
-set_tests_properties(delivery_web PROPERTIES SKIP_RETURN_CODE 77 TIMEOUT 600 LABELS web)
+set_tests_properties(delivery_web PROPERTIES SKIP_RETURN_CODE 77 TIMEOUT 600 LABELS web COST 100)
 if(TARGET texmesh AND TARGET make_scan)
   add_executable(compose_plane browser/compose_plane.cpp)
   target_link_libraries(compose_plane PRIVATE texmesh_stages texmesh_delivery)
@@ -18,9 +18,11 @@ if(TARGET texmesh AND TARGET make_scan)
   target_link_libraries(flip_pictures PRIVATE texmesh_stages)
   add_executable(export_environment browser/export_environment.cpp)
   target_link_libraries(export_environment PRIVATE texmesh_stages nlohmann_json::nlohmann_json)
-  foreach(test IN ITEMS "web_browser_ready make-packages.mjs" "web_browser tests.mjs" "web_publish publish.mjs")
+  foreach(test IN ITEMS "web_browser_ready make-packages.mjs" "web_browser tests.mjs untimed" "web_browser_timed tests.mjs timed"
+    "web_publish publish.mjs")
     separate_arguments(test)
     list(POP_FRONT test name)
+    list(JOIN test " " test)
     add_test(NAME ${name} COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/browser/run ${CMAKE_CURRENT_BINARY_DIR}/browser
       $<TARGET_FILE:texmesh> $<TARGET_FILE:make_scan> $<TARGET_FILE:compose_plane> $<TARGET_FILE:export_environment>
       $<$<BOOL:${TEXMESH_LAB}>:$<TARGET_FILE:texmesh-lab>>)
@@ -29,7 +31,8 @@ if(TARGET texmesh AND TARGET make_scan)
   endforeach()
   set_tests_properties(web_browser_ready PROPERTIES FIXTURES_SETUP browser FIXTURES_REQUIRED "" COST 1000
     ENVIRONMENT TEXMESH_BROWSER_PROGRAM=make-packages.mjs)
-  set_tests_properties(web_publish PROPERTIES COST 900)
+  # Those that wait most begin first, one at a time: other tests have the cores meanwhile (tests/run).
+  set_tests_properties(web_browser web_publish PROPERTIES COST 900 RESOURCE_LOCK browser)
   # A browser that draws without a GPU takes both cores, and its deadlines are kept only when it has them.
-  set_tests_properties(web_browser PROPERTIES RUN_SERIAL ON)
+  set_tests_properties(web_browser_timed PROPERTIES RUN_SERIAL ON)
 endif()

@@ -100,7 +100,7 @@ test('the camera turns during the timed part: what is refined then is what it lo
   const [stayed, other] = [refined.false, refined.true];
   const both = [...other].filter((f) => stayed.has(f)).length;
   check(stayed.size > 4 && other.size > 4 && both < 0.7 * Math.min(stayed.size, other.size), `${both} of ${stayed.size} and ${other.size} fragments are the same`);
-}, {seconds: 120});
+}, {seconds: 120, timed: true});
 
 test('coming nearer during a load: it ends in time, with what the new view asks for', () => throttled({}, async (page, link, url) => {
   await lab(page, () => window.lab.start({size: 900, zoom: 0.4}));
@@ -125,7 +125,7 @@ test('coming nearer during a load: it ends in time, with what the new view asks 
   const {state, events} = await lab(page, (i) => window.lab.report(i), id);
   check(state.scale < far && state.scale === state.wantedScale, `S_${far}, then S_${state.scale} of S_${state.wantedScale}`);
   check(!events.some((e) => e.name === 'error'), JSON.stringify(events.filter((e) => e.name === 'error')));
-}), {seconds: 90});
+}), {seconds: 90, timed: true});
 
 test('no crack opens at a switch: no background within the outline', () => throttled({bytesPerSecond: 500000}, async (page, link, url) => {
   await lab(page, () => window.lab.start({size: 400, background: 0xff00ff}));
@@ -157,7 +157,7 @@ test('no crack opens at a switch: no background within the outline', () => throt
   const cracks = holes.map((h) => h.filter(([x, y]) => !through.some(([u, v]) => Math.hypot(u - x, v - y) < 8)).length);
   check(holes.length > 5 && through.length < 20, `${holes.length} frames, the last with ${through.length} pixels of background inside`);
   check(Math.max(...cracks) === 0, `pixels of background inside, by frame: ${cracks}`);
-}), {seconds: 60});
+}), {seconds: 60, timed: true});
 
 test('a lost graphics context: the library makes anew what it had', async () => {
   const b = await common();

@@ -4,20 +4,29 @@ import path from 'node:path';
 
 const cases = [];
 
-/** Registers a case. `body` gets {skip(reason)}; what it throws is the failure. */
-export function test(name, body, {seconds = 60} = {}) {
-  cases.push({name, body, seconds});
+let running;
+
+/** Registers a case. `body` gets {skip(reason)}; what it throws is the failure. `timed`: it is held to times, and wants the machine for itself. */
+export function test(name, body, {seconds = 60, timed = false} = {}) {
+  cases.push({name, body, seconds, timed});
 }
+
+/** Whether what runs has the machine for itself: a timed case, or a program that measures. */
+export const hasMachine = () => running?.timed ?? true;
 
 class Skipped extends Error {}
 
 const escaped = (text) => String(text).replace(/[<>&"]/g, (c) => `&#${c.charCodeAt(0)};`).replace(/[^\x20-\x7e\n]/g, '?');
 
-/** Runs every case whose name holds one of TEXMESH_BROWSER_ONLY, with commas between (all without it); exits with 1 when one fails. */
-export async function runAll(suite) {
+/**
+ * Runs every case whose name holds one of TEXMESH_BROWSER_ONLY, with commas between (all without it), and that is timed, or is not, as `timed`
+ * says (both without it). Gives 1 when one fails.
+ */
+export async function runAll(suite, timed) {
   const only = (process.env.TEXMESH_BROWSER_ONLY ?? '').split(',');
   const results = [];
-  for (const c of cases.filter((x) => only.some((text) => x.name.includes(text)))) {
+  for (const c of cases.filter((x) => only.some((text) => x.name.includes(text)) && x.timed === (timed ?? x.timed))) {
+    running = c;
     const start = performance.now();
     let timer;
     const late = new Promise((_, fail) => {

@@ -62,7 +62,7 @@ test('notes: a tour goes from stop to stop, and fetches nothing of a package wit
   check(/^1/.test(stops.seen[0]) && /^2/.test(stops.seen[1]), JSON.stringify(stops));
   check(stops.s > 7 && stops.s < 11, `${stops.s} s for a stop of 8`);
   check(stops.ahead.some(([stop, cosine]) => stop === 1 && cosine < 0.9), `the next stop is not fetched ahead: ${JSON.stringify(stops.ahead)}`);
-}), {seconds: 60});
+}), {seconds: 60, timed: true});
 
 test('notes: a curator places one by Enter, writes, and saves a file that the compiler takes', () => onPage(noted('annotate'), async (page) => {
   await settled(page, 1);

@@ -106,7 +106,7 @@ test('a proxy gives way to scales in one frame: nothing flashes, nothing moves, 
     check(after.fromLast <= before.fromLast + 0.5, `the scale is ${after.fromLast.toFixed(2)} levels from the end, the proxy was ${before.fromLast.toFixed(2)}`);
     check(page.said.length === 0, page.said.join('\n'));
   });
-}, {seconds: 120});
+}, {seconds: 120, timed: true});
 
 test('a proxy that cannot be decoded leaves the load to scales', async () => {
   const b = await common();

@@ -1,5 +1,6 @@
 // How long this machine has kept the browser waiting for a processor: a deadline that is missed by no more says nothing of the client.
 import fs from 'node:fs';
+import {hasMachine} from './harness.mjs';
 
 /** Processes by their parents' ids. */
 function children() {
@@ -31,6 +32,7 @@ function queued() {
  * to do says hundredths of a second, so a late client is late there.
  */
 export function starvation() {
+  if (!hasMachine()) throw new Error('a case that is held to times must say so: {timed: true}');
   const before = queued();
   return () => Math.max(0, ...[...queued()].map(([tid, s]) => s - (before.get(tid) ?? 0)));
 }

@@ -173,7 +173,7 @@ test('the first picture takes one round trip', () => throttled({}, async (page, 
   const {roundTrips, bytes} = waitedFor(r.requests, shown.at);
   check(roundTrips <= 1, `${roundTrips} round trips`);
   check(bytes <= 65536, `${bytes} bytes`);
-}));
+}), {timed: true});
 
 test('a deadline is kept on a slow link', () => throttled({}, async (page, link, url) => {
   const starved = starvation();
@@ -183,7 +183,7 @@ test('a deadline is kept on a slow link', () => throttled({}, async (page, link,
   check(deadline, 'no deadline');
   check(deadline.actual <= 4 * kLate + starved(), `${deadline.actual} s of 4, ${starved()} s without a processor`);
   check(deadline.actual >= 4 * 0.85, `${deadline.actual} s of 4 were used`);
-}), {seconds: 90});
+}), {seconds: 90, timed: true});
 
 test('the link changes by half, the deadline stays', () => throttled({changes: 0.5, seed: 7}, async (page, link, url) => {
   const starved = starvation();
@@ -191,7 +191,7 @@ test('the link changes by half, the deadline stays', () => throttled({changes: 0
   check(!r.error, JSON.stringify(r.error));
   const deadline = r.events.find((e) => e.name === 'deadline');
   check(deadline.actual <= 4 * kLate + starved(), `${deadline.actual} s of 4, ${starved()} s without a processor`);
-}), {seconds: 90});
+}), {seconds: 90, timed: true});
 
 test('the server dies in the middle: what is there stays, and the error says so', () => throttled({}, async (page, link, url) => {
   const id = await lab(page, (u) => window.lab.load(u, {open: {retries: 1, retryDelayS: 0.05, stallTimeoutS: 2}, load: {time: 20, autoRefine: false}}), url);
@@ -302,7 +302,7 @@ test('cancelling ends it at once', () => throttled({bytesPerSecond: 100000}, asy
   const sent = await link.sent();
   await new Promise((f) => setTimeout(f, 700));
   check(await link.sent() - sent < 30000, 'bytes still flow');
-}), {seconds: 60});
+}), {seconds: 60, timed: true});
 
 test('scale and texture follow the display', async () => {
   const b = await common();
@@ -354,7 +354,7 @@ test('no frame is empty while scales and textures arrive', () => throttled({byte
   for (const n of covered.slice(first)) near(n, last, last * 0.15, 'covered pixels of a frame');
   // A frame without its texture would be lighter or darker.
   for (const mean of light.slice(first)) near(mean, light.at(-1), 0.03 * light.at(-1), 'mean light of a frame');
-}), {seconds: 60});
+}), {seconds: 60, timed: true});
 
 test('a model without textures', async () => {
   const b = await common();
@@ -416,7 +416,9 @@ for (const [what, file] of [['no such package', 'none.texmesh'], ['something els
 }
 
 makePackages();
-const code = await runAll('web_browser');
+// `timed`: the cases that are held to times, `untimed`: the others, which other tests may run beside; neither word: all.
+const timed = {timed: true, untimed: false}[process.argv[2]];
+const code = await runAll(timed ? 'web_browser_timed' : 'web_browser', timed);
 console.log(`pictures in ${pictures}`);
 await closeCommon();
 process.exit(code);

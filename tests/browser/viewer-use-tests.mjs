@@ -105,7 +105,7 @@ test('viewer: the time limit by keyboard counts for the next load, and is kept',
   await timedPartOver(page);
   const l = await live(page, (x) => ({done: x.doneS, limit: x.limitS, bytes: x.bytes, before: x.transfers.filter((t) => t.start < 0).length}));
   check(l.limit === 3 && l.done <= 3 * 1.1 + starved() && l.done > 2 && l.before === 0, JSON.stringify(l));
-}), {seconds: 60});
+}), {seconds: 60, timed: true});
 
 test('viewer: every control can be reached and used by keyboard', () => withViewer('?pkg=packages/maps.texmesh&time=1', async (page) => {
   await phase(page, 'done');
@@ -249,4 +249,4 @@ test('viewer: where frames are slow, what comes is not kept waiting by them, and
   check(Math.min(...gaps) > 1.8 * slowMs, `frames ${gaps.map(Math.round)} ms apart`);
   check(!during.some((t) => t > limit - 0.8 * slowMs && t < limit), 'a frame at the last moment');
   check(drawn.some((t) => t >= over - 20), 'no frame of the end');
-}, {quiet: false, through: {bytesPerSecond: 120000, rttMs: 20}}), {seconds: 60});
+}, {quiet: false, through: {bytesPerSecond: 120000, rttMs: 20}}), {seconds: 60, timed: true});
