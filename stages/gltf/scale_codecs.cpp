@@ -7,7 +7,6 @@
 namespace texmesh {
 namespace {
 
-using Json = GlbWriter::Json;
 constexpr int kArrayBuffer = 34962, kElementArrayBuffer = 34963;
 
 /// Vertices in the order of first use by cache-friendly triangles: both codecs, and deflate, profit.
@@ -70,7 +69,7 @@ class PlainPrimitive {
     CodedPrimitive coded;
     coded.triangles = static_cast<std::uint32_t>(primitive_.indices.size() / 3);
     coded.vertices = static_cast<std::uint32_t>(n_);
-    Json& attributes = coded.json["attributes"];
+    GltfJson& attributes = coded.json["attributes"];
     attributes["POSITION"] = positions();
     if (!coding_.mesh.normals.empty()) attributes["NORMAL"] = normals();
     for (int set = 0; set < 2; ++set)
@@ -113,10 +112,10 @@ class PlainPrimitive {
     };
     const Stream s = on_grid ? as(std::uint16_t{}) : as(float{});
     if (on_grid) writer_.use_extension("KHR_mesh_quantization", true);
-    Json accessor{{"bufferView", add(s, false)},
-                  {"componentType", on_grid ? 5123 : 5126},
-                  {"count", n_},
-                  {"type", "VEC3"}};
+    GltfJson accessor{{"bufferView", add(s, false)},
+                      {"componentType", on_grid ? 5123 : 5126},
+                      {"count", n_},
+                      {"type", "VEC3"}};
     if (on_grid) {
       accessor["min"] = {static_cast<int>(box.min.x), static_cast<int>(box.min.y),
                          static_cast<int>(box.min.z)};
@@ -136,7 +135,7 @@ class PlainPrimitive {
     constexpr bool kIsFloat = std::is_same_v<T, float>;
     constexpr int kType = kIsFloat ? 5126 : 5119 + 2 * static_cast<int>(sizeof(T)) - std::is_signed_v<T>;
     const Stream s = make_stream(n_, [&](std::size_t i) { return coded<T>(of_wedge(primitive_.wedges[i])); });
-    Json accessor{{"bufferView", add(s, false)}, {"componentType", kType}};
+    GltfJson accessor{{"bufferView", add(s, false)}, {"componentType", kType}};
     if (!kIsFloat) accessor["normalized"] = true;
     accessor["count"] = n_;
     accessor["type"] = "VEC" + std::to_string(std::tuple_size_v<Numbers>);
@@ -200,8 +199,6 @@ class PlainPrimitive {
   const ScalePrimitive& primitive_;
   std::size_t n_;
 };
-
-using Json = GlbWriter::Json;
 
 /// The attributes of a primitive under way: what Draco needs to know about each, and what glTF says about it.
 class DracoPrimitive {

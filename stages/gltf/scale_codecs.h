@@ -5,6 +5,8 @@
 
 namespace texmesh {
 
+using GltfJson = GlbWriter::Json;
+
 /// A cube of evenly spaced places that coordinates are rounded to, the same for every scale and primitive, so
 /// that a vertex that several scales share has the same bits in all of them.
 struct QuantisationGrid {

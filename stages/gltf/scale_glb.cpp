@@ -5,8 +5,6 @@
 namespace texmesh {
 namespace {
 
-using Json = GlbWriter::Json;
-
 float unit(float x) { return std::clamp(x, 0.0f, 1.0f); }
 
 /// Hands out texture and sampler indices, equal ones once.
@@ -16,7 +14,7 @@ class TextureTable {
       : writer_(writer), has_uv_(has_uv) {
     for (const GlbImage& p : images) {
       image_of_[p.image] = writer_.array("images").size();
-      Json image{{"name", "texture/" + std::to_string(p.image)}, {"mimeType", p.mime_type}};
+      GltfJson image{{"name", "texture/" + std::to_string(p.image)}, {"mimeType", p.mime_type}};
       if (!p.uri.empty())
         image["uri"] = p.uri;
       else
@@ -26,14 +24,14 @@ class TextureTable {
   }
 
   /// A textureInfo, or null when the texture cannot be shown.
-  Json info(const TextureRef& ref) {
+  GltfJson info(const TextureRef& ref) {
     if (!ref.used() || ref.texcoord > 1 || !has_uv_[ref.texcoord]) return nullptr;
     const auto image = image_of_.find(static_cast<std::uint32_t>(ref.image));
     if (image == image_of_.end()) return nullptr;
-    Json out{{"index", texture(image->second, sampler(ref))}};
+    GltfJson out{{"index", texture(image->second, sampler(ref))}};
     if (ref.texcoord != 0) out["texCoord"] = ref.texcoord;
     if (!ref.transform.is_identity()) {
-      Json transform;
+      GltfJson transform;
       if (ref.transform.offset != Vec2f{0, 0})
         transform["offset"] = GlbWriter::shortest({ref.transform.offset.x, ref.transform.offset.y});
       if (ref.transform.rotation != 0) transform["rotation"] = GlbWriter::shortest(ref.transform.rotation);
@@ -65,7 +63,7 @@ class TextureTable {
   std::size_t texture(std::size_t image, std::size_t sampler) {
     const auto [it, fresh] = textures_.try_emplace({image, sampler}, textures_.size());
     if (!fresh) return it->second;
-    Json texture{{"sampler", sampler}};
+    GltfJson texture{{"sampler", sampler}};
     if (writer_.array("images")[image]["mimeType"] == "image/webp") {
       texture["extensions"]["EXT_texture_webp"]["source"] = image;
       writer_.use_extension("EXT_texture_webp", true);
@@ -83,15 +81,15 @@ class TextureTable {
 };
 
 /// As the source had it, less the textures that cannot be shown.
-Json extension_json(const MaterialExtension& extension, TextureTable& textures) {
-  Json out = Json::object();
+GltfJson extension_json(const MaterialExtension& extension, TextureTable& textures) {
+  GltfJson out = GltfJson::object();
   for (const ExtensionFactor& factor : extension.factors) {
-    Json values = Json::array();
+    GltfJson values = GltfJson::array();
     for (float x : factor.values) values.push_back(GlbWriter::shortest(x));
     out[factor.key] = values.size() == 1 ? values[0] : values;
   }
   for (const ExtensionTexture& t : extension.textures) {
-    Json info = textures.info(t.texture);
+    GltfJson info = textures.info(t.texture);
     if (info.is_null()) continue;
     if (t.scale != 1) info["scale"] = GlbWriter::shortest(t.scale);
     out[t.key] = std::move(info);
@@ -99,26 +97,27 @@ Json extension_json(const MaterialExtension& extension, TextureTable& textures) 
   return out;
 }
 
-Json material_json(const Material& m, TextureTable& textures, GlbWriter& writer) {
-  Json out;
+GltfJson material_json(const Material& m, TextureTable& textures, GlbWriter& writer) {
+  GltfJson out;
   if (!m.name.empty()) out["name"] = m.name;
-  Json pbr;
+  GltfJson pbr;
   pbr["baseColorFactor"] = GlbWriter::shortest(
       {unit(m.base_colour.x), unit(m.base_colour.y), unit(m.base_colour.z), unit(m.base_colour.w)});
-  if (Json t = textures.info(m.base_colour_texture); !t.is_null()) pbr["baseColorTexture"] = t;
+  if (GltfJson t = textures.info(m.base_colour_texture); !t.is_null()) pbr["baseColorTexture"] = t;
   pbr["metallicFactor"] = GlbWriter::shortest(unit(m.metallic));
   pbr["roughnessFactor"] = GlbWriter::shortest(unit(m.roughness));
-  if (Json t = textures.info(m.metallic_roughness_texture); !t.is_null()) pbr["metallicRoughnessTexture"] = t;
+  if (GltfJson t = textures.info(m.metallic_roughness_texture); !t.is_null())
+    pbr["metallicRoughnessTexture"] = t;
   out["pbrMetallicRoughness"] = pbr;
-  if (Json t = textures.info(m.normal_texture); !t.is_null()) {
+  if (GltfJson t = textures.info(m.normal_texture); !t.is_null()) {
     if (m.normal_scale != 1) t["scale"] = GlbWriter::shortest(m.normal_scale);
     out["normalTexture"] = t;
   }
-  if (Json t = textures.info(m.occlusion_texture); !t.is_null()) {
+  if (GltfJson t = textures.info(m.occlusion_texture); !t.is_null()) {
     if (m.occlusion_strength != 1) t["strength"] = GlbWriter::shortest(unit(m.occlusion_strength));
     out["occlusionTexture"] = t;
   }
-  if (Json t = textures.info(m.emissive_texture); !t.is_null()) out["emissiveTexture"] = t;
+  if (GltfJson t = textures.info(m.emissive_texture); !t.is_null()) out["emissiveTexture"] = t;
   if (m.emissive != Vec3f{})
     out["emissiveFactor"] = GlbWriter::shortest({unit(m.emissive.x), unit(m.emissive.y), unit(m.emissive.z)});
   if (m.alpha_mode == AlphaMode::kMask) {
@@ -129,7 +128,7 @@ Json material_json(const Material& m, TextureTable& textures, GlbWriter& writer)
   }
   if (m.double_sided) out["doubleSided"] = true;
   if (m.unlit) {
-    out["extensions"]["KHR_materials_unlit"] = Json::object();
+    out["extensions"]["KHR_materials_unlit"] = GltfJson::object();
     writer.use_extension("KHR_materials_unlit", false);
   }
   for (const MaterialExtension& extension : m.extensions) {
@@ -224,8 +223,8 @@ std::string node_name(const Mesh& mesh, std::uint16_t part) {
   return parts_merged(mesh) ? "parts" : mesh.part_names.at(part);
 }
 
-Json node_json(const ScaleCoding& coding, std::uint16_t part) {
-  Json node{{"name", node_name(coding.mesh, part)}};
+GltfJson node_json(const ScaleCoding& coding, std::uint16_t part) {
+  GltfJson node{{"name", node_name(coding.mesh, part)}};
   if (coding.positions_are_indices()) {
     const Vec3f origin = coding.position.origin;
     const float step = coding.position.step();
@@ -311,12 +310,12 @@ ScaleFile write_scale(const ScaleCoding& coding, const NestedScale& scale,
       open_part = part;
       writer.array("nodes").at(part)["mesh"] = writer.array("meshes").size();
       writer.array("meshes").push_back(
-          {{"name", node_name(coding.mesh, part)}, {"primitives", Json::array()}});
+          {{"name", node_name(coding.mesh, part)}, {"primitives", GltfJson::array()}});
       if (parts_merged(coding.mesh)) writer.array("meshes").back()["extras"]["partNames"] = merged_names;
     }
     if (parts_merged(coding.mesh)) {
       coded.json["extensions"]["EXT_mesh_features"]["featureIds"] =
-          Json::array({{{"featureCount", merged_names.size()}, {"attribute", 0}, {"label", "part"}}});
+          GltfJson::array({{{"featureCount", merged_names.size()}, {"attribute", 0}, {"label", "part"}}});
       writer.use_extension("EXT_mesh_features", false);
     }
     writer.array("meshes").back()["primitives"].push_back(std::move(coded.json));

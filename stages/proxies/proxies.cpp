@@ -1,7 +1,7 @@
 #include "stages/proxies/proxies.h"
 
 #include "format/base/portable_math.h"
-#include "stages/proxies/whole/whole_scale.h"
+#include "stages/proxies/whole_scale.h"
 
 namespace texmesh {
 namespace {
@@ -15,8 +15,7 @@ constexpr int kFineFrom = 100000, kNormalMapPaysFrom = 100000;  // bytes
 constexpr int kScaleFrom = 100000;
 constexpr int kFirstBits = 10, kBits = 11, kFineBits = 12;  // of positions
 constexpr double kMostOfSource = 0.35;
-constexpr double kMostWithScales = 0.25; // of the source, where the last one is a scale
-constexpr double kWorthIts = 0.9;        // of the FLIP of the proxy before: what a scale is kept for
+constexpr double kWorthIts = 0.9;  // of the FLIP of the proxy before: what a scale is kept for
 // Of the smallest size: what is loaded soon needs no other first picture.
 constexpr double kMostOfSmallSource = 0.15;
 // Of the first size: what Draco, which scales are coded by, needs for the same picture.
@@ -276,10 +275,7 @@ const char* ProxySizes::why_not(const Candidate& best, const FlipSum& large) {
   learned_.holds_whole_object = !first && size <= static_cast<double>(kept_.back().made.proxy.glb.size());
   if (learned_.holds_whole_object) return kWholeTakesFewer;
   if (!scales_compete()) return nullptr;
-  if (best.is_scale) {
-    if (learned_.all_bytes + size > kMostWithScales / kMostOfSource * subject_.most_bytes) return kOfSource;
-    return large.mean() > kWorthIts * kept_.back().large.mean() ? kLittleBetter : nullptr;
-  }
+  if (best.is_scale) return large.mean() > kWorthIts * kept_.back().large.mean() ? kLittleBetter : nullptr;
   const auto rival_bytes = static_cast<std::uint64_t>((first ? kFirstShare : 1) * size);
   const bool loses = competitors_.win(rival_bytes, best.flip.mean(), learned_.prices, context_);
   if (first) learned_.smallest_loses = loses;

@@ -38,7 +38,7 @@ struct ProxiesOptions {
 /// - Normals of baked vertices are there where S_0 is smooth. Where it is not, pictures decide between them
 ///   and flat triangles.
 /// - A scale: its mesh on coarse grids, the source's materials, and its images at sizes and qualities that
-///   lose least in lit pictures for the bytes that the mesh leaves; see whole/whole_scale.cpp. Clients count
+///   lose least in lit pictures for the bytes that the mesh leaves; see whole_scale.cpp. Clients count
 ///   a proxy's textures as four squares of its longest side, so a scale of which all textures together are
 ///   larger is none.
 /// - File: GLB with images inside: WebP where it is baked, else JPEG, and WebP where there is alpha. The
@@ -54,8 +54,8 @@ struct ProxiesOptions {
 ///   compared with what plans pay for scales: tables, the coarsest mesh, texels as their coding leaves them.
 ///   A small size is not tried where the likeliest scale is farther ahead of the last size than baked proxies
 ///   come by their bytes. A scale is left out where it is less than a tenth nearer than the proxy before it.
-///   All proxies take at most 35 % of the source, of its images' files and of S_0's mesh, coded; with a scale
-///   25 %. A source of which the smallest size is more than 15 % gets none: it is loaded soon.
+///   All proxies take at most 35 % of the source, of its images' files and of S_0's mesh, coded. A source of
+///   which the smallest size is more than 15 % gets none: it is loaded soon.
 /// Sizes that get no proxy have a note that says why; no model fails because of its proxies. `pixels` are
 /// fill_planes()'s. Same bytes for any thread count and machine.
 Proxies make_proxies(const NestedScales& scales, const std::vector<Material>& materials,

@@ -17,7 +17,7 @@ struct PullLevel {
 };
 
 /// Means of 2 x 2 by their weights; a weight of 1 is full knowledge.
-PullLevel halved(const PullLevel& fine) {
+PullLevel half_map(const PullLevel& fine) {
   PullLevel out{(fine.width + 1) / 2, (fine.height + 1) / 2, {}, {}};
   out.value.resize(std::size_t{out.width} * out.height);
   out.weight.resize(out.value.size(), 0);
@@ -383,7 +383,7 @@ void push_pull(std::vector<Vec3f>& values, const std::vector<std::uint8_t>& cove
   std::vector<PullLevel> levels(1);
   levels[0] = {width, height, std::move(values), {}};
   for (const std::uint8_t c : covered) levels[0].weight.push_back(c ? 1 : 0);
-  while (levels.back().width > 1 || levels.back().height > 1) levels.push_back(halved(levels.back()));
+  while (levels.back().width > 1 || levels.back().height > 1) levels.push_back(half_map(levels.back()));
   for (std::size_t l = levels.size() - 1; l-- > 0;) {
     PullLevel& fine = levels[l];
     for (std::uint32_t y = 0; y < fine.height; ++y)

@@ -313,8 +313,8 @@ Proxies proxies_of_scales(const NestedScales& scales, const ProxyModel& model, s
 }
 
 TEST(Proxies, EachSizeIsDecidedByItself) {
-  // 55 % of the first size hold no mesh. A file of a scale holds S_0 with all texels in the second, and is all
-  // that the third could hold.
+  // 55 % of the first size hold no mesh. A file of a scale holds S_0 with all texels in the second, and is
+  // all that the third could hold.
   const ProxyModel model = with_source(noisy(Mesh{}), 10000000);
   const Proxies made = proxies_of_scales(two_scales(60, 2), model, {8000, 200000, 500000});
   ASSERT_EQ(made.proxies.size(), 2u);

@@ -239,13 +239,12 @@ Table kinds_table(const std::vector<KindBytes>& kinds, std::uint64_t sum) {
 
 std::string proxies_text(const Manifest& m) {
   if (m.proxies.empty()) return "";
-  Table table(
-      "proxies (whole objects in small files; mean FLIP of lit pictures at displayed heights in px)",
-      {"proxy",
-       {"triangles", kGrouped},
-       {"vertices", kGrouped},
-       {"kB", kKilobytes},
-       {"texture", 0, "", "px"}});
+  Table table("proxies (whole objects in small files; mean FLIP of lit pictures at displayed heights in px)",
+              {"proxy",
+               {"triangles", kGrouped},
+               {"vertices", kGrouped},
+               {"kB", kKilobytes},
+               {"texture", 0, "", "px"}});
   for (const double px : m.proxy_sizes_px) table.column({"FLIP at " + *pixels(px).shown, shortest_form(3)});
   for (std::size_t k = 0; k < m.proxies.size(); ++k) {
     const ManifestProxy& p = m.proxies[k];

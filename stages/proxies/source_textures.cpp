@@ -1,4 +1,4 @@
-#include "stages/proxies/whole/source_textures.h"
+#include "stages/proxies/source_textures.h"
 
 #include "format/base/portable_math.h"
 #include "stages/image/resize.h"

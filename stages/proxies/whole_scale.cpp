@@ -6,7 +6,7 @@
 // and the images are chosen by sums: what the mesh leaves is dealt out along the curves.
 // 4. The mesh is coded. Where it takes other bytes than was thought, the choice is made again.
 // 5. The images are coded, at qualities that fill the file.
-#include "stages/proxies/whole/whole_scale.h"
+#include "stages/proxies/whole_scale.h"
 
 #include "format/base/portable_math.h"
 #include "stages/geometry/scale_frames.h"

@@ -2,7 +2,7 @@
 // Inside the room only: a scale with the source's atlas as a proxy of a number of bytes.
 #include "stages/gltf/scale_glb.h"
 #include "stages/proxies/make_proxy.h"
-#include "stages/proxies/whole/source_textures.h"
+#include "stages/proxies/source_textures.h"
 
 namespace texmesh {
 
