@@ -318,6 +318,7 @@ constexpr double kPoorQuality = 15;  // pictures get smaller before they get wor
 constexpr double kNormalQualityAbove = 10, kDataQualityBelow = 5;  // as the stage codes them
 constexpr int kQualityTries = 10, kQuickTries = 4;
 constexpr double kNearlyAll = 0.99, kRoughly = 0.96;
+constexpr double kCarefulGains = 2;     // quality, of coding that takes its time
 constexpr double kTableErrs = 1.15;     // times what the package tells of a proxy's difference, at most
 constexpr double kSmallerLoses = 0.35;  // a file of half the bytes differs 2 to this power times as much
 constexpr double kWorthATry = 1.3;      // times the difference of the best, by tables
@@ -403,6 +404,7 @@ class ProxySearch {
   bool may_look_better(std::uint32_t proxy) const {
     const double times = static_cast<double>(reference_.package.manifest().proxies[proxy].glb.bytes) /
                          static_cast<double>(bytes_);
+    if (reference_.wishes.fast() && fits(best_)) return times <= 1 && table_flip(proxy) < best_.difference;
     const double likely =
         table_flip(proxy) * (times > 1 ? portable::pow(times, kSmallerLoses) : 1 / kTableErrs);
     return !fits(best_) || likely < (times > 1 ? kWorthATry : 1) * best_.difference;
@@ -473,6 +475,7 @@ class ProxySearch {
     if (reference_.wishes.fast()) return offer(std::move(file));
     if (!best && fits(best_) && file.difference > kGoesOn * best_.difference) return;
     std::vector<ProxyTrial> seen{trial};
+    Rate rate = rate_;
     const auto try_next = [&](const ProxyTrial& next) {
       if (std::ranges::find(seen, next) != seen.end()) return false;
       seen.push_back(next);
@@ -481,6 +484,7 @@ class ProxySearch {
       if ((poor && !best) || !better(other, file)) return false;
       file = std::move(other);
       trial = next;
+      rate = rate_;
       return true;
     };
     const auto try_jpeg = [&] {
@@ -510,6 +514,7 @@ class ProxySearch {
     if (best) try_jpeg();
     if (!best && fits(file)) {
       Extracted looked_at = file;
+      rate_ = {rate.quality + kCarefulGains, rate.texels};
       make(*parts, trial, looked_at, true);
       file = std::move(looked_at);
     }
@@ -598,7 +603,7 @@ class ProxySearch {
       return whole.finish();
     };
     double start = 50;  // bytes of a texel grow about as exp(quality / 30)
-    if (quick && known_texels_ > 0) start = known_quality_ + 30 * portable::log(known_texels_ / texels);
+    if (rate_.texels > 0) start = rate_.quality + 30 * portable::log(rate_.texels / texels);
     const double best =
         maps.empty()
             ? kHighestQuality
@@ -610,7 +615,7 @@ class ProxySearch {
     out.mesh_bytes = out.glb.size();
     out.triangles = parts.triangles(trial.mesh);
     for (const ExtractedImage& i : out.images) out.mesh_bytes -= i.bytes;
-    if (quick) known_quality_ = best, known_texels_ = texels;
+    if (quick) rate_ = {best, texels};
     if (!fits(out)) return false;
     if (!reference_.wishes.fast()) measure(draft.finish(), out, in_whole);
     return best >= kPoorQuality;
@@ -620,7 +625,11 @@ class ProxySearch {
   const std::uint64_t bytes_;
   std::map<std::uint32_t, double>& whole_;
   Extracted& best_;
-  double known_quality_ = 50, known_texels_ = 0;  // of the last file that was looked at in windows
+  /// The quality that fills the bytes with so many texels.
+  struct Rate {
+    double quality = 50, texels = 0;
+  };
+  Rate rate_;  // of the last file that was coded quickly
   // Of one proxy:
   std::map<std::tuple<bool, bool, std::size_t, int>, StandaloneGlb> files_;  // by maps, mesh, bits
   std::map<std::tuple<bool, bool, double>, std::vector<ProxyMap>> maps_;     // by maps, share
