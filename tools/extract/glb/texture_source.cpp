@@ -147,9 +147,9 @@ std::vector<Pixels>& TextureSource::levels(std::size_t index, std::uint32_t plan
   const std::uint32_t skip = cut_[index];
   const TextureInfo& info = package_.textures()[plane];
   const std::uint32_t read = plane_at_level(package_.textures(), plane, read_level(index));
-  Pixels full = read_plane(package_, read, kBestRung, context_);
-  if (const auto shown = shown_.find(plane); shown != shown_.end() && read == plane)
-    fill_uncovered(full, shown->second, context_, PartBlocks::kSmooth);
+  const auto shown = shown_.find(plane);
+  const bool is_shown = shown != shown_.end() && read == plane;
+  Pixels full = read_plane(package_, read, kBestRung, context_, is_shown ? &shown->second : nullptr);
   // As pictures read smaller copies of a whole texture: others would differ from the package's best.
   const std::uint32_t halved = skip - package_.textures()[read].mip;
   if (effort_ != ExtractEffort::kBest && full.width_px % (1u << halved) == 0 &&
