@@ -7,10 +7,10 @@
 // ways, which gives each image a curve of loss against bytes (LossCurves). Of a large texture only the parts
 // are coded that the windows read (TextureTiles). Every coded mesh is rendered with the best textures. Losses
 // of mesh and textures are added up.
-// 4. The mesh: compile has measured what scales lose, so two or three meshes that are made and looked at tell
-// which is likely. From it, with --best from another likely one, the search walks to neighbours, finer and
-// coarser, while the sum of losses falls. What a mesh leaves of the bytes is dealt out along the curves,
-// where it takes away most loss.
+// 4. The mesh: compile has measured what scales lose, and of S_0 as it is stored everything is known. So one
+// to three meshes that are made and looked at tell which is likely. From it, with --best from another likely
+// one, the search walks to neighbours, finer and coarser, while the sum of losses falls. What a mesh leaves
+// of the bytes is dealt out along the curves, where it takes away most loss.
 // 5. The file is written and filled up to at least 98 % of the bytes (Filling).
 // 6. Sums of losses are guesses, so in a small file whole pictures decide between few: other sizes of the
 // texture that loses most, in few bytes other codings of it, a leaner mesh, other shares. One that is plainly
