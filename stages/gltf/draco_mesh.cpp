@@ -124,7 +124,7 @@ void use_grid(draco::ExpertEncoder& encoder, const CodedAttribute& attribute, in
   encoder.options().SetAttributeOptions(attribute.id, options);
 }
 
-/// The stream, and the mesh that a decoder makes of it.
+/// The stream, and the mesh that a decoder makes of it; null with kDracoFastest.
 std::unique_ptr<draco::Mesh> encode_mesh(draco::Mesh& mesh, const CodedAttributes& attributes, int speed,
                                          DracoStream& out) {
   // Equal values get one index, so that connectivity is that of positions and every other attribute's seams
@@ -146,6 +146,11 @@ std::unique_ptr<draco::Mesh> encode_mesh(draco::Mesh& mesh, const CodedAttribute
   out.bytes.assign(buffer.data(), buffer.data() + buffer.size());
   for (const auto& [name, a] : attributes)
     out.attributes[name] = static_cast<int>(mesh.attribute(a.id)->unique_id());
+  if (speed == kDracoFastest) {  // a list of points: a decoder finds the same
+    out.vertices = mesh.num_points();
+    out.triangles = static_cast<std::uint32_t>(mesh.num_faces());
+    return nullptr;
+  }
   // What a decoder will find. The encoder's own count of points is too high where seams meet at non-manifold
   // vertices.
   std::string why_not;

@@ -225,7 +225,7 @@ class DracoPrimitive {
   }
 
   CodedPrimitive code(GlbWriter& writer) {
-    const DracoStream stream = mesh_.encode(10 - coding_.options.draco_level);
+    const DracoStream stream = mesh_.encode(coding_.draco_speed);
     return {writer.add_draco(stream, std::move(accessors_)), stream.triangles, stream.vertices};
   }
 

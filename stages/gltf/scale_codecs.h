@@ -60,6 +60,7 @@ struct ScaleCoding {
   bool fine_colours = false;   // 16 bits, because 8 would change them
   std::vector<bool> tangents;  // per material: its primitives have them where their wedges do
   ScaleFrames frames;          // stand for the mesh's normals and tangents
+  int draco_speed = 10 - ScalesOptions::draco_level;
   /// Every wedge of the primitive has a tangent and its material needs it.
   bool writes_tangents(const ScalePrimitive& primitive) const;
   const std::vector<Vec2f>& uv_values(int set) const { return set == 0 ? mesh.uv0 : mesh.uv1; }

@@ -333,7 +333,7 @@ GltfScales write_gltf_scales(const NestedScales& scales, const PerceptualValues&
 }
 
 std::vector<std::uint8_t> write_streamed_scale(const Mesh& mesh, const SplitStreamHead& head,
-                                               const ScalesOptions& options) {
+                                               const ScalesOptions& options, bool hasty) {
   const auto grid = [](const SplitGrid& g) {
     return QuantisationGrid{g.bits, {g.origin[0], g.origin[1], g.origin[2]}, g.range};
   };
@@ -347,6 +347,7 @@ std::vector<std::uint8_t> write_streamed_scale(const Mesh& mesh, const SplitStre
                      needs_fine_colours(mesh.colours),
                      std::vector<bool>(materials + std::size_t{1}, true),
                      {mesh.normals, mesh.tangents}};
+  if (hasty) coding.draco_speed = kDracoFastest;
   constexpr int kShortBits = 16;
   const bool draco = options.mesh_codec == MeshCodec::kDraco;
   if (draco || (options.mesh_codec != MeshCodec::kNone && head.position.bits <= kShortBits))

@@ -67,8 +67,9 @@ GltfScales write_gltf_scales(const NestedScales& scales, const PerceptualValues&
 
 /// A mesh that lies on the grids of a stream's head (split_model), as the GLB that write_scales() would have
 /// written, with the tangents that the mesh has, but without images and with nameless materials: as many as
-/// its triangles count. Throws StageError when nothing is left on the grid.
+/// its triangles count. `hasty`: Draco hardly compresses it, which serves where it is coded again soon.
+/// Throws StageError when nothing is left on the grid.
 std::vector<std::uint8_t> write_streamed_scale(const Mesh& mesh, const SplitStreamHead& head,
-                                               const ScalesOptions& options);
+                                               const ScalesOptions& options, bool hasty = false);
 
 }  // namespace texmesh

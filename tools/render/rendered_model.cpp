@@ -220,6 +220,13 @@ std::vector<std::uint8_t> known_texels(const TextureInfo& info, const std::vecto
   return bits;
 }
 
+/// Whether all texels of `part` are in `bits`.
+bool holds(const std::vector<std::uint8_t>& bits, const std::vector<std::uint8_t>& part) {
+  for (std::size_t i = 0; i < bits.size() && i < part.size(); ++i)
+    if (part[i] & ~bits[i]) return false;
+  return true;
+}
+
 void require_size(const TextureInfo& info, std::uint32_t plane) {
   if (std::uint64_t{info.width_px} * info.height_px > kMaxPixels)
     throw FormatError(kTexturesPath, "/textures/" + std::to_string(plane),
@@ -242,8 +249,8 @@ void decode_fragments(const TextureInfo& info, const std::string& rung_path, con
   });
 }
 
-Pixels read_plane(PackageReader& package, std::uint32_t plane, std::uint32_t rung,
-                  const RunContext& context) {
+Pixels read_plane(PackageReader& package, std::uint32_t plane, std::uint32_t rung, const RunContext& context,
+                  const std::vector<std::uint8_t>* shown) {
   const TextureInfo& info = package.textures().at(plane);
   const PlaneTables& tables = package.tables().planes.at(plane);
   require_size(info, plane);
@@ -257,8 +264,11 @@ Pixels read_plane(PackageReader& package, std::uint32_t plane, std::uint32_t run
   std::vector<bool> known(tables.fragment_count());
   for (const std::uint16_t f : tables.order) known[f] = !streams.stream(f).empty();
   decode_fragments(info, info.rungs[top].path, streams, tables.order, out, context);
-  if (std::find(known.begin(), known.end(), false) != known.end())
-    fill_uncovered(out, known_texels(info, known), context);
+  if (std::find(known.begin(), known.end(), false) != known.end()) {
+    const std::vector<std::uint8_t> bits = known_texels(info, known);
+    if (!shown || !holds(bits, *shown)) fill_uncovered(out, bits, context);
+  }
+  if (shown) fill_uncovered(out, *shown, context, PartBlocks::kSmooth);
   return out;
 }
 

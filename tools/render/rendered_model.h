@@ -93,9 +93,11 @@ std::uint32_t sheet_columns(int count);
 
 /// A plane put together again from all its fragments at one rung: width x height texels without the
 /// fragments' overhang. What is not stored (nobody sees it) continues its neighbours smoothly, so that
-/// smaller copies show no seams. Reads the rung as one entry, digest checked. FormatError when the package is
+/// smaller copies show no seams; where `shown` tells the texels that are shown (TexturePlane::coverage), all
+/// others do. Reads the rung as one entry, digest checked. FormatError when the package is
 /// damaged or the plane has more than 4e8 texels. Same result for any thread count.
-Pixels read_plane(PackageReader& package, std::uint32_t plane, std::uint32_t rung, const RunContext& context);
+Pixels read_plane(PackageReader& package, std::uint32_t plane, std::uint32_t rung, const RunContext& context,
+                  const std::vector<std::uint8_t>* shown = nullptr);
 
 /// Decodes fragments of a plane, of those that `streams` has, into their places in it. FormatError naming
 /// `rung_path` for a fragment of another size.

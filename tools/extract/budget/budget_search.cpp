@@ -7,10 +7,10 @@
 // ways, which gives each image a curve of loss against bytes (LossCurves). Of a large texture only the parts
 // are coded that the windows read (TextureTiles). Every coded mesh is rendered with the best textures. Losses
 // of mesh and textures are added up.
-// 4. The mesh: compile has measured what scales lose, so two or three meshes that are made and looked at tell
-// which is likely. From it, with --best from another likely one, the search walks to neighbours, finer and
-// coarser, while the sum of losses falls. What a mesh leaves of the bytes is dealt out along the curves,
-// where it takes away most loss.
+// 4. The mesh: compile has measured what scales lose, and of S_0 as it is stored everything is known. So one
+// to three meshes that are made and looked at tell which is likely. From it, with --best from another likely
+// one, the search walks to neighbours, finer and coarser, while the sum of losses falls. What a mesh leaves
+// of the bytes is dealt out along the curves, where it takes away most loss.
 // 5. The file is written and filled up to at least 98 % of the bytes (Filling).
 // 6. Sums of losses are guesses, so in a small file whole pictures decide between few: other sizes of the
 // texture that loses most, in few bytes other codings of it, a leaner mesh, other shares. One that is plainly
@@ -232,8 +232,12 @@ void Search::choose_mesh() {
   if (reference_.wishes.fast()) {
     geometry_[known_] = table_geometry(known_);
     known_bytes_ = kTableBytes * static_cast<double>(scales()[known_.scale].triangles);
-  } else {
+  } else if (reference_.wishes.best()) {
     least_ = loss_of(best_);
+  } else {  // of S_0 as it is stored everything is known
+    known_ = {0, kMeshCodings - 1};
+    geometry_[known_] = 0;
+    known_bytes_ = static_cast<double>(scales().front().glb.bytes);
   }
   if (!reference_.wishes.best()) choose_mesh_by_tables();
   if (!reference_.wishes.fast()) walk_to_mesh();
@@ -252,7 +256,7 @@ double Search::likely_loss(const MeshKey& key) {
   const auto triangles = [&](std::size_t scale) { return static_cast<double>(scales()[scale].triangles); };
   const LikelyCoding &of_known = kLikelyCodings[known_.coding], &of_key = kLikelyCodings[key.coding];
   const double lost = joined(geometry_.at(known_)) - of_known.loss, of_scale = scale_loss(known_.scale);
-  const double scale_losses = of_scale > 0 ? std::max(lost / of_scale, 0.1) : 1;
+  const double scale_losses = of_scale > 0 && !known_.is_finest() ? std::max(lost / of_scale, 0.1) : 1;
   const double bytes = known_bytes_ / of_known.bytes * of_key.bytes *
                        portable::exp((1 - kFinerScalesTakeLess) *
                                      portable::log(triangles(key.scale) / triangles(known_.scale)));
@@ -265,11 +269,11 @@ double Search::likely_loss(const MeshKey& key) {
 void Search::choose_mesh_by_tables() {
   for (int tries = 0; tries < 3; ++tries) {
     if (reference_.wishes.fast() && least_ < kNothing) return;
-    MeshKey likely = known_;
+    MeshKey likely = best_;
     double least = kNothing;
     for (std::size_t scale = 0; scale < scales().size(); ++scale)
       for (int coding = 0; coding < kMeshCodings; ++coding) {
-        if (reference_.wishes.scale && scale != known_.scale) continue;
+        if (reference_.wishes.scale && scale != best_.scale) continue;
         if (reference_.wishes.fast() && scale == 0 && coding + 1 < kMeshCodings) continue;  // takes long
         const double loss = likely_loss({scale, coding});
         if (loss < least) least = loss, likely = {scale, coding};

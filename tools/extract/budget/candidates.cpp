@@ -56,7 +56,8 @@ Candidates::ScaleToCode& Candidates::scale_to_code(int scale) {
     return scales_.front();
   }
   if (scales_.size() >= kMostScales) scales_.pop_back();
-  StandaloneGlb file = scale_file(reference_.package, scale, reference_.context, StreamedNormals::kStreamed);
+  const auto normals = reference_.wishes.best() ? StreamedNormals::kStreamed : StreamedNormals::kHasty;
+  StandaloneGlb file = scale_file(reference_.package, scale, reference_.context, normals);
   const bool lit_anew = scale > 0 && !reference_.light.places.empty();
   DracoRecoder recoder(file.draco_streams(), lit_anew ? &reference_.light : nullptr, mesh_path(scale));
   return scales_.emplace_front(scale, std::move(file), std::move(recoder));
@@ -66,7 +67,10 @@ std::unique_ptr<StandaloneGlb> Candidates::recoded_scale(int scale, const MeshKe
   ScaleToCode& from = scale_to_code(scale);
   auto file = std::make_unique<StandaloneGlb>(from.file);
   const bool lit_anew = scale > 0 && !reference_.light.places.empty();
-  if (file->has_draco() && (lit_anew || key.coding + 1 < kMeshCodings || key.extra_bits < 0))
+  const PackageReader& package = reference_.package;
+  const bool hasty =
+      !reference_.wishes.best() && !package.manifest().scales[package.scale_index(scale)].has_glb();
+  if (file->has_draco() && (lit_anew || hasty || key.coding + 1 < kMeshCodings || key.extra_bits < 0))
     file->set_draco_streams(from.recoder.coded(steps_of(key), reference_.context));
   return file;
 }
@@ -192,12 +196,21 @@ float Candidates::sharpening(std::size_t image, double share) const {
 }
 
 Pixels Candidates::texels(std::size_t image, double share) {
-  if (const auto known = small_.find({image, share}); known != small_.end()) return known->second;
+  if (const auto small = small_.find({image, share}); small != small_.end()) return small->second;
   const Vec2<std::uint32_t> side = sides(image, share);
   std::vector<std::uint8_t> coverage;
   if (reference_.wishes.images != ExtractImages::kPng)
     coverage = reference_.shown_texels(image, side.x, side.y);
-  Pixels out = textures_.texels(image, side.x, side.y, coverage, sharpening(image, share));
+  const auto known = std::ranges::find_if(tiles_, [&](const auto& tiles) {
+    return tiles.first.first == image && size_step(tiles.first.second) == share;
+  });
+  Pixels out;
+  if (known != tiles_.end()) {  // without alpha
+    out = known->second.image;
+    if (!coverage.empty()) fill_uncovered(out, coverage, reference_.context);
+  } else {
+    out = textures_.texels(image, side.x, side.y, coverage, sharpening(image, share));
+  }
   if (std::size_t{side.x} * side.y <= kSmallTexels) small_[{image, share}] = out;
   return out;
 }

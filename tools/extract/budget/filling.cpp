@@ -11,7 +11,13 @@ namespace {
 
 constexpr double kLeastShare = 0.98;  // of the bytes asked for
 constexpr double kNear = 0.99;        // where the search for a quality may stop
+constexpr double kNearest = 0.995;    // the same of a large file whose last image is quickly coded
+constexpr std::uint64_t kLargeFile = 200000;
+constexpr double kCheapTexels = 1.5e6;
 constexpr double kFastNear = 0.9;
+constexpr double kSampleNear = 0.995;
+constexpr int kSampleTries = 6;
+constexpr int kLearningTries = 3;
 constexpr int kFastTries = 3;
 constexpr double kLikelyPart = 0.7;  // of the package's bytes of a source: a file of it is worth a try
 constexpr double kMiddle = 50;       // the level at which qualities stay
@@ -27,21 +33,28 @@ std::vector<std::size_t> all_of(std::size_t count) {
 }  // namespace
 
 double quality_for(double wanted, double start, double near, int tries,
-                   const std::function<std::uint64_t(double)>& bytes) {
+                   const std::function<std::uint64_t(double)>& bytes, bool learns) {
+  double grows = 30, last = 0, last_bytes = 0;  // bytes grow about as exp(quality / 30) in the middle
   double low = kLowestQuality, high = kHighestQuality, at = std::clamp(start, low, high);
-  double low_bytes = 0, high_bytes = 0, best = kLowestQuality;
+  double low_bytes = 0, high_bytes = 0, best = kLowestQuality, best_bytes = 0;
   for (int i = 0; i < tries && high - low > 0.01; ++i) {
     const auto found = static_cast<double>(bytes(at));
     if (found <= wanted) {
       best = std::max(best, at);
+      best_bytes = std::max(best_bytes, found);
       low = at, low_bytes = found;
-      if (found >= near * wanted || at >= kHighestQuality) break;
+      if (at >= kHighestQuality) break;
     } else {
       high = at, high_bytes = found;
       if (at <= kLowestQuality) break;
     }
-    // Bytes grow about as exp(quality / 30) in the middle of the scale.
-    double next = at + 30 * portable::log(std::max(wanted, 1.0) * (1 + near) / 2 / std::max(found, 1.0));
+    // JPEGs have whole quantisers: nearer to the bytes there often is no file, which eight tries would tell.
+    const double enough = learns && i + 1 >= kLearningTries ? 2 * near - 1 : near;
+    if (best_bytes >= enough * wanted) break;
+    if (learns && last_bytes > 0 && found != last_bytes && found > 0)
+      grows = std::clamp((at - last) / portable::log(found / last_bytes), 8.0, 90.0);
+    last = at, last_bytes = found;
+    double next = at + grows * portable::log(std::max(wanted, 1.0) * (1 + near) / 2 / std::max(found, 1.0));
     if (low_bytes > 0 && high_bytes > low_bytes)
       next = low + (high - low) * portable::log(wanted * (1 + near) / 2 / low_bytes) /
                        portable::log(high_bytes / low_bytes);
@@ -136,16 +149,18 @@ FilledFile Filling::file_of(const MeshFile& mesh, const Draft& draft) const {
   return file;
 }
 
-void Filling::by_level(double start, int tries, const std::function<FilledFile(double level)>& at,
-                       FilledFile& best) const {
+void Filling::by_level(double start, double near, int tries,
+                       const std::function<FilledFile(double level)>& at, FilledFile& best) const {
   const bool fast = reference_.wishes.fast();
-  quality_for(static_cast<double>(bytes_), start, fast ? kFastNear : kNear, fast ? kFastTries : tries,
-              [&](double level) {
-                FilledFile file = at(level);
-                const std::size_t bytes = file.glb.size();
-                replace_if_larger(std::move(file), best);
-                return bytes;
-              });
+  quality_for(
+      static_cast<double>(bytes_), start, fast ? kFastNear : near, fast ? kFastTries : tries,
+      [&](double level) {
+        FilledFile file = at(level);
+        const std::size_t bytes = file.glb.size();
+        replace_if_larger(std::move(file), best);
+        return bytes;
+      },
+      !reference_.wishes.best());
 }
 
 /// Bytes that are left go into the source's own coefficients, of the images first that lose most.
@@ -173,12 +188,36 @@ void Filling::by_source(const MeshFile& mesh, const DealtBytes& allocation, Draf
   }
 }
 
+/// The quality with which an image of a file is likely to fill the bytes: a sample of a large JPEG tells how
+/// its bytes grow, as whole ones take long to code.
+double Filling::likely_quality(const Draft& draft, std::size_t image, const FilledFile& file) const {
+  const ImagePlan& plan = draft.plans[image];
+  const Pixels& pixels = draft.pixels[image];
+  const auto now = static_cast<double>(draft.files[image].bytes.size());
+  const double wanted =
+      static_cast<double>(bytes_) * (1 + kNear) / 2 - static_cast<double>(file.glb.size()) + now;
+  if (reference_.wishes.effort != ExtractEffort::kUsual || plan.coding.format != FileImage::kJpeg ||
+      plan.coding.stored || !(draft.coded[image] == plan) || wanted <= 0 ||
+      !TextureTiles::suits(pixels.width_px, pixels.height_px))
+    return plan.quality;
+  const TextureTiles tiles(pixels, {}, {}, 0, reference_.context);
+  const auto bytes_at = [&](double quality) {
+    return static_cast<std::uint64_t>(tiles.file_bytes(
+        candidates_.encoded(image, tiles.sample(), plan.coding, quality, false).bytes.size()));
+  };
+  const double times = now / static_cast<double>(bytes_at(plan.quality));
+  return quality_for(wanted / times, plan.quality, kSampleNear, kSampleTries, bytes_at, true);
+}
+
 /// The image that got the last bytes takes up what the prediction missed.
 void Filling::by_last_image(const MeshFile& mesh, std::size_t last, Draft& draft, FilledFile& best) const {
   const ImagePlan& plan = draft.plans[last];
   if (!is_lossy(plan) || (plan.is_source() && fits(best))) return;  // larger there is nothing
+  const double texels = static_cast<double>(draft.pixels[last].width_px) * draft.pixels[last].height_px;
+  const bool cheap = reference_.wishes.effort == ExtractEffort::kUsual && !plan.coding.stored &&
+                     bytes_ > kLargeFile && texels < kCheapTexels;
   by_level(
-      draft.plans[last].quality, 10,
+      likely_quality(draft, last, best), cheap ? kNearest : kNear, 10,
       [&](double quality) {
         draft.plans[last].quality = quality;
         encode(draft, {last});
@@ -190,7 +229,7 @@ void Filling::by_last_image(const MeshFile& mesh, std::size_t last, Draft& draft
 void Filling::by_all_qualities(const MeshFile& mesh, Draft& draft, FilledFile& best) const {
   const std::vector<ImagePlan> plans = draft.plans;
   by_level(
-      kMiddle, 12,
+      kMiddle, kNear, 12,
       [&](double level) {
         for (std::size_t i = 0; i < plans.size(); ++i)
           draft.plans[i].quality =
@@ -206,7 +245,11 @@ void Filling::by_sizes(const MeshFile& mesh, Draft& draft, FilledFile& best) con
   double least = 1;
   for (const ImagePlan& p : plans) least = std::min(least, p.share);
   double low = fits(best) ? 1 : 0, high = fits(best) ? 1 / std::max(least, 1e-6) : 1;
-  for (int i = 0; i < 16 && !fills(best); ++i) {
+  const auto fills_nearly = [&] {
+    return reference_.wishes.fast() && fits(best) &&
+           static_cast<double>(best.glb.size()) >= kFastNear * static_cast<double>(bytes_);
+  };
+  for (int i = 0; i < 16 && !fills(best) && !fills_nearly(); ++i) {
     const double times = i == 0 && low > 0 ? high : (low + high) / 2;
     resize(draft, plans, times);
     FilledFile file = file_of(mesh, draft);

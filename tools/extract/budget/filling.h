@@ -6,9 +6,10 @@ namespace texmesh {
 
 /// The quality, of those tried, for which bytes(quality) comes nearest to `wanted` from below; the lowest one
 /// where none does. By the secant of the bytes' logarithm from `start`, until `near` of `wanted` is reached.
-/// Calls bytes() at most `tries` times; it should grow with the quality.
+/// Calls bytes() at most `tries` times; it should grow with the quality. `learns`: the secant
+/// is that of the last two bytes, wherever they lie, and from the third try on twice as far is near enough.
 double quality_for(double wanted, double start, double near, int tries,
-                   const std::function<std::uint64_t(double)>& bytes);
+                   const std::function<std::uint64_t(double)>& bytes, bool learns = false);
 
 /// A mesh as files of a number of bytes have it, with as much of what is known of the object as they may say.
 struct MeshFile {
@@ -51,9 +52,10 @@ class Filling {
   void set_pixels(Draft& draft, std::size_t image) const;
   FilledFile file_of(const MeshFile& mesh, const Draft& draft) const;
   /// Makes the file that fills best of those with level 1 .. 100 of `at`, which grow with it.
-  void by_level(double start, int tries, const std::function<FilledFile(double level)>& at,
+  void by_level(double start, double near, int tries, const std::function<FilledFile(double level)>& at,
                 FilledFile& best) const;
   void by_source(const MeshFile& mesh, const DealtBytes& allocation, Draft& draft, FilledFile& best) const;
+  double likely_quality(const Draft& draft, std::size_t image, const FilledFile& file) const;
   void by_last_image(const MeshFile& mesh, std::size_t last, Draft& draft, FilledFile& best) const;
   void by_all_qualities(const MeshFile& mesh, Draft& draft, FilledFile& best) const;
   void by_sizes(const MeshFile& mesh, Draft& draft, FilledFile& best) const;

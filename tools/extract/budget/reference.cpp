@@ -52,6 +52,19 @@ Materials with_textures(Materials materials, const std::vector<std::int32_t>& pl
   return materials;
 }
 
+/// Which textures a picture reads.
+std::vector<std::uint8_t> textures_read(const LitViews& views, std::size_t view) {
+  const LitMesh& lit = views.mesh();
+  std::vector<std::uint8_t> out(lit.texture_count), known(lit.materials.size());
+  for (const RenderFragment& f : views.visibility(view).fragments) {
+    const std::uint16_t material = lit.mesh.triangle_material[f.triangle];
+    if (std::exchange(known[material], 1)) continue;
+    for (const TextureSlot& slot : lit.materials[material].textures)
+      if (slot.texture >= 0) out[static_cast<std::size_t>(slot.texture)] = 1;
+  }
+  return out;
+}
+
 double longest_side(const Mesh& mesh) {
   const double side = to_double(bounding_box(mesh.positions)).longest_side();
   return side > 0 ? side : 1;
@@ -216,14 +229,21 @@ std::vector<double> LitMeter::differences(const LitViews& views, const std::vect
     }
     materials.push_back(with_textures(views.mesh().materials, place));
   }
-  std::vector<const Materials*> lists;
-  for (const Materials& m : materials) lists.push_back(&m);
   std::vector<double> sums(changes.size());
   for (std::size_t v = 0; v < reference_.size(); ++v) {
+    const std::vector<std::uint8_t> read = textures_read(views, v);
+    std::vector<const Materials*> lists(1, &materials.front());
+    std::vector<std::size_t> seen;  // the changes that this picture shows
+    for (std::size_t k = 0; k < changes.size(); ++k) {
+      if (std::ranges::none_of(changes[k], [&](const auto& change) { return read[change.first]; })) continue;
+      seen.push_back(k);
+      lists.push_back(&materials[k + 1]);
+    }
+    if (seen.empty()) continue;
     const PictureVariants pictures = views.pictures(v, lists, all, environment_, context);
-    parallel_for(context, sums.size(), 1, [&](std::size_t begin, std::size_t end) {
+    parallel_for(context, seen.size(), 1, [&](std::size_t begin, std::size_t end) {
       for (std::size_t k = begin; k < end; ++k)
-        sums[k] += weights_[v] * flip_of(reference_[v], prepare_flip(pictures.picture(k + 1)));
+        sums[seen[k]] += weights_[v] * flip_of(reference_[v], prepare_flip(pictures.picture(k + 1)));
     });
   }
   return sums;

@@ -443,7 +443,8 @@ StandaloneGlb scale_file(PackageReader& package, int scale, const RunContext& co
   options.mesh_codec = first.codec();
   // Streamed normals are for searches, which decode what they look at.
   const auto rules = fitted ? std::optional(GlbRules::kPackage) : std::nullopt;
-  first.take_meshes({write_streamed_scale(mesh, reader.head(), options), mesh_path(scale), rules});
+  const bool hasty = normals == StreamedNormals::kHasty;
+  first.take_meshes({write_streamed_scale(mesh, reader.head(), options, hasty), mesh_path(scale), rules});
   return first;
 }
 

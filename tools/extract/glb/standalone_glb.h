@@ -89,8 +89,9 @@ std::string placed_notes(const Annotations& annotations, const OutputTransform& 
 void add_notes(std::vector<std::uint8_t>& glb, const std::string& notes);
 
 /// The normals of a scale that the vertex-split stream alone has. kFitted: so that it is lit as S_0 is, which
-/// takes the whole stream. kStreamed: S_0's, as the stream's prefix of the scale has them.
-enum class StreamedNormals : std::uint8_t { kFitted, kStreamed };
+/// takes the whole stream. kStreamed: S_0's, as the stream's prefix of the scale has them. kHasty: the same
+/// in a mesh that is hardly compressed, to be coded again.
+enum class StreamedNormals : std::uint8_t { kFitted, kStreamed, kHasty };
 
 /// A scale as one file with the previews in it, wherever the package has the scale. A scale of the stream
 /// gets materials, images and node names of the coarsest scale's GLB, that file's mesh codec, and where it

@@ -141,42 +141,46 @@ std::uint32_t TextureSource::read_level(std::size_t index) const {
   return effort_ == ExtractEffort::kUsual ? std::max(cut_[index], 1u) - 1 : 0;
 }
 
-const std::vector<Pixels>& TextureSource::levels(std::size_t index, std::uint32_t plane, Averaging kind) {
+std::vector<Pixels>& TextureSource::levels(std::size_t index, std::uint32_t plane, Averaging kind) {
   std::vector<Pixels>& levels = planes_[plane];
   if (!levels.empty()) return levels;
   const std::uint32_t skip = cut_[index];
   const TextureInfo& info = package_.textures()[plane];
   const std::uint32_t read = plane_at_level(package_.textures(), plane, read_level(index));
-  Pixels full = read_plane(package_, read, kBestRung, context_);
-  if (const auto shown = shown_.find(plane); shown != shown_.end() && read == plane)
-    fill_uncovered(full, shown->second, context_, PartBlocks::kSmooth);
+  const auto shown = shown_.find(plane);
+  const bool is_shown = shown != shown_.end() && read == plane;
+  Pixels full = read_plane(package_, read, kBestRung, context_, is_shown ? &shown->second : nullptr);
   // As pictures read smaller copies of a whole texture: others would differ from the package's best.
   const std::uint32_t halved = skip - package_.textures()[read].mip;
-  if (effort_ == ExtractEffort::kUsual && full.width_px % (1u << halved) == 0 &&
+  if (effort_ != ExtractEffort::kBest && full.width_px % (1u << halved) == 0 &&
       full.height_px % (1u << halved) == 0)
     full = coarser_level(std::move(full), kind == Averaging::kLight, halved, context_);
   else if (skip > 0)
     full = reduced(full, full.width_px, full.height_px, half_of(info.width_px, skip),
                    half_of(info.height_px, skip), kind);
   levels.push_back(std::move(full));
-  while (levels.back().width_px > 8 && levels.back().height_px > 8) {
-    const Pixels& last = levels.back();
-    levels.push_back(reduced(last, last.width_px, last.height_px, half_of(last.width_px, 1),
-                             half_of(last.height_px, 1), kind));
-  }
   return levels;
+}
+
+/// The smallest level that has twice these sides: averaging it again costs no sharpness.
+const Pixels& TextureSource::level_for(std::size_t index, std::uint32_t plane, Averaging kind,
+                                       std::uint32_t width_px, std::uint32_t height_px) {
+  std::vector<Pixels>& from = levels(index, plane, kind);
+  for (std::size_t level = 0;; ++level) {
+    const Pixels& p = from[level];
+    const std::uint32_t half_width = half_of(p.width_px, 1), half_height = half_of(p.height_px, 1);
+    if (p.width_px <= 8 || p.height_px <= 8 || half_width < 2 * width_px || half_height < 2 * height_px)
+      return p;
+    if (level + 1 == from.size())
+      from.push_back(reduced(p, p.width_px, p.height_px, half_width, half_height, kind));
+  }
 }
 
 Pixels TextureSource::plane_texels(std::size_t index, std::uint32_t base, std::uint32_t width_px,
                                    std::uint32_t height_px, const std::vector<std::uint8_t>& coverage,
                                    float sharpening) {
   const Averaging kind = base == images_[index].plane ? images_[index].averaging() : Averaging::kNumbers;
-  const std::vector<Pixels>& from = levels(index, base, kind);
-  std::size_t level = 0;  // the smallest that is twice as large: averaging it again costs no sharpness
-  while (level + 1 < from.size() && from[level + 1].width_px >= 2 * width_px &&
-         from[level + 1].height_px >= 2 * height_px)
-    ++level;
-  const Pixels& p = from[level];
+  const Pixels& p = level_for(index, base, kind, width_px, height_px);
   Pixels out = reduced(p, p.width_px, p.height_px, std::min(width_px, p.width_px),
                        std::min(height_px, p.height_px), kind, images_[index].colours ? sharpening : 0.f);
   if (coverage.size() == coverage_size_bytes(out.width_px, out.height_px))

@@ -58,7 +58,9 @@ class TextureSource {
  private:
   std::vector<std::uint32_t> levels_cut(double most_texels, double least_texels) const;
   std::uint32_t read_level(std::size_t index) const;
-  const std::vector<Pixels>& levels(std::size_t index, std::uint32_t plane, Averaging kind);
+  std::vector<Pixels>& levels(std::size_t index, std::uint32_t plane, Averaging kind);
+  const Pixels& level_for(std::size_t index, std::uint32_t plane, Averaging kind, std::uint32_t width_px,
+                          std::uint32_t height_px);
   Pixels plane_texels(std::size_t index, std::uint32_t base, std::uint32_t width_px, std::uint32_t height_px,
                       const std::vector<std::uint8_t>& coverage, float sharpening);
   PackageReader& package_;
@@ -68,7 +70,7 @@ class TextureSource {
   double most_texels_, least_texels_;
   std::vector<std::uint32_t> unread_, cut_;                   // by image: how often sides are halved
   std::map<std::uint32_t, std::vector<std::uint8_t>> shown_;  // by plane
-  std::map<std::uint32_t, std::vector<Pixels>> planes_;       // by plane: halves, halves of them ..
+  std::map<std::uint32_t, std::vector<Pixels>> planes_;       // by plane: halves, as far as asked for
 };
 
 /// One rung of a plane of codec jpeg as one image. FormatError for another codec, and as JoinedJpeg.

@@ -251,10 +251,13 @@ Json ProxyParts::materials_of(const ProxyMapChoice& choice) const {
   return root;
 }
 
-StandaloneGlb ProxyParts::file(const ProxyMapChoice& choice, std::size_t mesh, const DracoSteps& steps,
-                               const RunContext& context) const {
-  StandaloneGlb coded = uncoded(meshes_.at(mesh), entry_);
-  coded.set_draco_streams(DracoRecoder(coded.draco_streams(), nullptr, entry_).coded(steps, context));
+StandaloneGlb ProxyParts::coded(std::size_t mesh, const DracoSteps& steps, const RunContext& context) const {
+  StandaloneGlb out = uncoded(meshes_.at(mesh), entry_);
+  out.set_draco_streams(DracoRecoder(out.draco_streams(), nullptr, entry_).coded(steps, context));
+  return out;
+}
+
+StandaloneGlb ProxyParts::file(const ProxyMapChoice& choice, const StandaloneGlb& coded) const {
   GlbParts chunks = read_glb(coded.finish(), entry_);
   Json root = materials_of(choice);
   keep_used(root);
@@ -317,7 +320,10 @@ constexpr double kShareStep = 0.75, kLeastProxyShare = 0.15;
 constexpr double kPoorQuality = 15;  // pictures get smaller before they get worse
 constexpr double kNormalQualityAbove = 10, kDataQualityBelow = 5;  // as the stage codes them
 constexpr int kQualityTries = 10, kQuickTries = 4;
-constexpr double kNearlyAll = 0.99, kRoughly = 0.96;
+constexpr double kNearlyAll = 0.99;
+constexpr double kRoughlyMost = 1.05,
+                 kRoughly = 0.95;       // of the pictures' bytes; of these, of files to choose by
+constexpr double kCarefulGains = 2;     // quality, of coding that takes its time
 constexpr double kTableErrs = 1.15;     // times what the package tells of a proxy's difference, at most
 constexpr double kSmallerLoses = 0.35;  // a file of half the bytes differs 2 to this power times as much
 constexpr double kWorthATry = 1.3;      // times the difference of the best, by tables
@@ -403,6 +409,7 @@ class ProxySearch {
   bool may_look_better(std::uint32_t proxy) const {
     const double times = static_cast<double>(reference_.package.manifest().proxies[proxy].glb.bytes) /
                          static_cast<double>(bytes_);
+    if (reference_.wishes.fast() && fits(best_)) return times <= 1 && table_flip(proxy) < best_.difference;
     const double likely =
         table_flip(proxy) * (times > 1 ? portable::pow(times, kSmallerLoses) : 1 / kTableErrs);
     return !fits(best_) || likely < (times > 1 ? kWorthATry : 1) * best_.difference;
@@ -463,6 +470,7 @@ class ProxySearch {
     const auto parts =
         ProxyParts::read(reference_.package.proxy_glb(proxy), proxy_path(proxy), reference_.context);
     if (!parts) return;
+    meshes_.clear();
     files_.clear();
     maps_.clear();
     ProxyTrial trial = first_trial(*parts, whole);
@@ -473,6 +481,7 @@ class ProxySearch {
     if (reference_.wishes.fast()) return offer(std::move(file));
     if (!best && fits(best_) && file.difference > kGoesOn * best_.difference) return;
     std::vector<ProxyTrial> seen{trial};
+    Rate rate = rate_;
     const auto try_next = [&](const ProxyTrial& next) {
       if (std::ranges::find(seen, next) != seen.end()) return false;
       seen.push_back(next);
@@ -481,12 +490,14 @@ class ProxySearch {
       if ((poor && !best) || !better(other, file)) return false;
       file = std::move(other);
       trial = next;
+      rate = rate_;
       return true;
     };
     const auto try_jpeg = [&] {
       ProxyTrial jpeg = trial;
       jpeg.format = FileImage::kJpeg;
-      if (reference_.wishes.images == ExtractImages::kAuto) try_next(jpeg);
+      if (reference_.wishes.images == ExtractImages::kAuto && (best || !has_alpha(*parts, trial)))
+        try_next(jpeg);
     };
     if (!best) try_jpeg();
     for (bool again = true; again;) {
@@ -509,9 +520,8 @@ class ProxySearch {
     }
     if (best) try_jpeg();
     if (!best && fits(file)) {
-      Extracted looked_at = file;
-      make(*parts, trial, looked_at, true);
-      file = std::move(looked_at);
+      rate_ = {rate.quality + kCarefulGains, rate.texels, rate.bytes};
+      make(*parts, trial, file, true);
     }
     offer(std::move(file));
   }
@@ -535,9 +545,9 @@ class ProxySearch {
     const auto key = std::tuple(trial.maps.data, trial.maps.normal, trial.mesh, trial.bits);
     const auto found = files_.find(key);
     if (found != files_.end()) return found->second;
-    return files_
-        .emplace(key, parts.file(trial.maps, trial.mesh, steps_of(parts, trial.bits), reference_.context))
-        .first->second;
+    std::optional<StandaloneGlb>& mesh = meshes_[{trial.mesh, trial.bits}];
+    if (!mesh) mesh = parts.coded(trial.mesh, steps_of(parts, trial.bits), reference_.context);
+    return files_.emplace(key, parts.file(trial.maps, *mesh)).first->second;
   }
 
   /// No JPEG has alpha.
@@ -551,6 +561,11 @@ class ProxySearch {
     if (fresh)
       for (ProxyMap& map : known->second = parts.maps(trial.maps)) map.pixels = smaller_map(map, trial.share);
     return known->second;
+  }
+
+  bool has_alpha(const ProxyParts& parts, const ProxyTrial& trial) {
+    return std::ranges::any_of(maps_of(parts, trial),
+                               [](const ProxyMap& map) { return map.pixels.channels == 4; });
   }
 
   static double quality_of(const ProxyMap& map, double quality) {
@@ -597,33 +612,50 @@ class ProxySearch {
       whole.set_images(p.files);
       return whole.finish();
     };
+    const bool learns = !reference_.wishes.best();
+    const double fixed = learns ? static_cast<double>(whole.finish().size()) : 0;  // bytes without pictures
+    const double room = static_cast<double>(bytes_) - fixed, most = quick ? kRoughlyMost * room : room;
+    if (learns && !maps.empty() && room <= 0) return out.glb = whole.finish(), false;
     double start = 50;  // bytes of a texel grow about as exp(quality / 30)
-    if (quick && known_texels_ > 0) start = known_quality_ + 30 * portable::log(known_texels_ / texels);
-    const double best =
-        maps.empty()
-            ? kHighestQuality
-            : quality_for(static_cast<double>(bytes_), start, quick ? kRoughly : kNearlyAll,
-                          quick ? kQuickTries : kQualityTries, [&](double q) { return file_at(q).size(); });
+    if (rate_.texels > 0)
+      start = rate_.quality + 30 * portable::log(rate_.texels / texels * room / rate_.bytes);
+    const auto bytes_of_pictures = [&](double q) {
+      return static_cast<std::uint64_t>(std::max(static_cast<double>(file_at(q).size()) - fixed, 1.0));
+    };
+    const double best = maps.empty()
+                            ? kHighestQuality
+                            : quality_for(most, start, quick ? kRoughly : kNearlyAll,
+                                          quick ? kQuickTries : kQualityTries, bytes_of_pictures, learns);
     out.glb = file_at(best);
+    const double filled = maps.empty() ? room : std::max(static_cast<double>(out.glb.size()) - fixed, 1.0);
     draft.set_images(made[best].files);
     out.images = made[best].rows;
     out.mesh_bytes = out.glb.size();
     out.triangles = parts.triangles(trial.mesh);
     for (const ExtractedImage& i : out.images) out.mesh_bytes -= i.bytes;
-    if (quick) known_quality_ = best, known_texels_ = texels;
-    if (!fits(out)) return false;
+    if (!(quick ? filled <= most : fits(out))) return false;
     if (!reference_.wishes.fast()) measure(draft.finish(), out, in_whole);
-    return best >= kPoorQuality;
+    if (!quick) return best >= kPoorQuality;
+    rate_ = {best, texels, filled};
+    // As if it filled the bytes.
+    out.difference *= portable::pow(filled / room, kSmallerLoses);
+    out.glb.resize(std::min<std::size_t>(out.glb.size(), bytes_));
+    return best + 30 * portable::log(room / filled) >= kPoorQuality;
   }
 
   const Reference& reference_;
   const std::uint64_t bytes_;
   std::map<std::uint32_t, double>& whole_;
   Extracted& best_;
-  double known_quality_ = 50, known_texels_ = 0;  // of the last file that was looked at in windows
+  /// What pictures of so many texels take.
+  struct Rate {
+    double quality = 50, texels = 0, bytes = 1;
+  };
+  Rate rate_;  // of the last file that was coded quickly
   // Of one proxy:
-  std::map<std::tuple<bool, bool, std::size_t, int>, StandaloneGlb> files_;  // by maps, mesh, bits
-  std::map<std::tuple<bool, bool, double>, std::vector<ProxyMap>> maps_;     // by maps, share
+  std::map<std::pair<std::size_t, int>, std::optional<StandaloneGlb>> meshes_;  // by mesh, bits
+  std::map<std::tuple<bool, bool, std::size_t, int>, StandaloneGlb> files_;     // by maps, mesh, bits
+  std::map<std::tuple<bool, bool, double>, std::vector<ProxyMap>> maps_;        // by maps, share
 };
 
 }  // namespace

@@ -44,11 +44,11 @@ class ProxyParts {
   std::size_t mesh_count() const { return meshes_.size(); }
   std::uint64_t triangles(std::size_t mesh) const { return meshes_[mesh].triangles.size(); }
 
-  /// The proxy with one of its meshes as KHR_draco_mesh_compression of these steps and without the maps that
-  /// are not chosen; image k is "texture/k" and holds one texel. Without the map of data, roughness and metal
-  /// are its means. Same bytes for any thread count.
-  StandaloneGlb file(const ProxyMapChoice& choice, std::size_t mesh, const DracoSteps& steps,
-                     const RunContext& context) const;
+  /// One of the meshes as KHR_draco_mesh_compression of these steps. Same bytes for any thread count.
+  StandaloneGlb coded(std::size_t mesh, const DracoSteps& steps, const RunContext& context) const;
+  /// The proxy with such a mesh and without the maps that are not chosen; image k is "texture/k" and holds
+  /// one texel. Without the map of data, roughness and metal are its means.
+  StandaloneGlb file(const ProxyMapChoice& choice, const StandaloneGlb& coded) const;
   /// The pictures of such a file, by k. Without the map of data, half of its occlusion is multiplied into the
   /// base colour, as the stage does it.
   std::vector<ProxyMap> maps(const ProxyMapChoice& choice) const;

@@ -32,6 +32,24 @@ TEST(QualityFor, ComesNearFromBelowInFewTries) {
     }
 }
 
+TEST(QualityFor, LearnsHowBytesGrowAndThatThereIsNoFileNearer) {
+  const auto tries = [](double wanted, double start, bool learns, const auto& bytes) {
+    int count = 0;
+    const auto counted = [&](double q) { return ++count, static_cast<std::uint64_t>(bytes(q)); };
+    const double q = quality_for(wanted, start, 0.99, 10, counted, learns);
+    EXPECT_LE(bytes(q), wanted);
+    EXPECT_GE(bytes(q), 0.98 * wanted);
+    return count;
+  };
+  const auto steep = [](double q) { return 1000 * std::exp(q / 60); };
+  EXPECT_LE(tries(4000, 20, true, steep), 3);
+  EXPECT_GT(tries(4000, 20, false, steep), 3);
+  const auto whole = [](double q) { return 1000 * std::exp(std::floor(q) / 36); };
+  const double between = 1.015 * whole(50);
+  EXPECT_EQ(tries(between, 47, true, whole), 3);
+  EXPECT_GT(tries(between, 47, false, whole), 8);
+}
+
 TEST(QualityFor, EndsAtTheEndsOfTheScale) {
   EXPECT_EQ(quality_for(10, 50, 0.97, 12, [](double q) { return 1000 + static_cast<std::uint64_t>(q); }), 1);
   EXPECT_EQ(quality_for(1e9, 50, 0.97, 12, [](double q) { return 1000 + static_cast<std::uint64_t>(q); }),

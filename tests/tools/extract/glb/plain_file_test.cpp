@@ -49,7 +49,7 @@ StandaloneGlb compressed_quad() {
          {{"pbrMetallicRoughness", {{"baseColorTexture", {{"index", 0}}}}}, {"name", "painted"}});
   b.json["meshes"][0]["primitives"][0]["material"] = 0;
   const auto parts = ProxyParts::read(b.glb(), "quad", {});
-  StandaloneGlb out = parts->file({}, 0, {0.001, 0.001, 8}, {});
+  StandaloneGlb out = parts->file({}, parts->coded(0, {0.001, 0.001, 8}, {}));
   out.set_images({{0, {FileImage::kWebp, encode_image(parts->maps({})[0].pixels, {FileImage::kWebp, 90})}}});
   return out;
 }

@@ -77,6 +77,32 @@ const Bytes& sheet_package() {
 PackageReader open(Bytes&& package) = delete;  // the reader keeps no bytes of its own
 PackageReader open(const Bytes& package) { return PackageReader(open_container(memory_source(package))); }
 
+std::size_t draco_bytes(const std::vector<DracoStream>& streams) {
+  std::size_t bytes = 0;
+  for (const DracoStream& s : streams) bytes += s.bytes.size();
+  return bytes;
+}
+
+TEST(ScaleFile, AHastyOneHoldsTheSameInMoreBytesUntilItIsCodedAgain) {
+  PackageReader package = open(sheet_package());
+  const std::vector<ManifestScale>& scales = package.manifest().scales;
+  const auto streamed = std::ranges::find_if(scales, [](const ManifestScale& s) { return !s.has_glb(); });
+  ASSERT_NE(streamed, scales.end());
+  const auto file = [&](StreamedNormals normals) {
+    return scale_file(package, streamed->scale, {}, normals);
+  };
+  const StandaloneGlb usual = file(StreamedNormals::kStreamed), hasty = file(StreamedNormals::kHasty);
+  EXPECT_GT(draco_bytes(hasty.draco_streams()), draco_bytes(usual.draco_streams()) * 5 / 4);
+  const Model a = read_model(usual, "a", {}), b = read_model(hasty, "b", {});
+  EXPECT_EQ(a.mesh.triangles.size(), b.mesh.triangles.size());
+  EXPECT_EQ(bounding_box(a.mesh.positions).max, bounding_box(b.mesh.positions).max);
+  const auto coded = [](const StandaloneGlb& f) {
+    return draco_bytes(DracoRecoder(f.draco_streams(), nullptr, "x").coded({0.05, 0.01}, {}));
+  };
+  EXPECT_NEAR(static_cast<double>(coded(hasty)), static_cast<double>(coded(usual)),
+              0.05 * static_cast<double>(coded(usual)));
+}
+
 nlohmann::json json_of(const Bytes& glb) {
   const std::size_t bytes = glb[12] | glb[13] << 8 | glb[14] << 16;
   return nlohmann::json::parse(glb.begin() + 20, glb.begin() + 20 + static_cast<std::ptrdiff_t>(bytes));

@@ -66,7 +66,7 @@ TEST(ProxyParts, AFileWithAllMapsIsTheProxyUnderDraco) {
   ASSERT_TRUE(parts);
   EXPECT_TRUE(parts->has(Use::kData) && parts->has(Use::kNormal) && parts->has(Use::kEmission));
   EXPECT_NEAR(parts->extent(), 2, 1e-6);
-  const StandaloneGlb file = parts->file({}, 0, kSteps, {});
+  const StandaloneGlb file = parts->file({}, parts->coded(0, kSteps, {}));
   EXPECT_TRUE(file.has_draco());
   EXPECT_EQ(file.source_images(), (std::vector<std::uint32_t>{0, 1, 2, 3}));
   const Bytes glb = file.finish();
@@ -93,7 +93,7 @@ TEST(ProxyParts, WithoutDataItsMeansStandAndOcclusionIsInTheColours) {
   const auto parts = ProxyParts::read(all_maps().glb(), "proxy", {});
   ASSERT_TRUE(parts);
   const ProxyMapChoice choice{false, false};
-  const Bytes glb = parts->file(choice, 0, kSteps, {}).finish();
+  const Bytes glb = parts->file(choice, parts->coded(0, kSteps, {})).finish();
   expect_valid(glb);
   const Material m = imported(glb).materials[0];
   EXPECT_FALSE(m.normal_texture.used() || m.occlusion_texture.used() || m.metallic_roughness_texture.used());
@@ -135,7 +135,7 @@ GltfBuilder scaled_coordinates() {
 TEST(ProxyParts, AScaleOfTextureCoordinatesIsInTheCoordinates) {
   const auto parts = ProxyParts::read(scaled_coordinates().glb(), "proxy", {});
   ASSERT_TRUE(parts);
-  const Bytes glb = parts->file({}, 0, kSteps, {}).finish();
+  const Bytes glb = parts->file({}, parts->coded(0, kSteps, {})).finish();
   expect_valid(glb);
   const Model m = imported(glb);
   EXPECT_TRUE(m.materials[0].base_colour_texture.transform.is_identity());
