@@ -38,8 +38,7 @@ struct ManifestScale {
   friend bool operator==(const ManifestScale&, const ManifestScale&) = default;
 };
 
-/// A baked version of the whole object with an atlas and textures of its own: a GLB that any viewer opens
-/// alone.
+/// The whole object with textures of its own in a small GLB that any viewer opens alone.
 struct ManifestProxy {
   EntryRef glb;  // proxy_path(k), k its place in Manifest::proxies
   std::uint32_t triangles = 0, vertices = 0;

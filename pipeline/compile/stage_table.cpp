@@ -226,9 +226,10 @@ std::vector<Stage> stage_table(const CompileOptions& o) {
       stage({"poster", kPosterVersion, "S_0 with the source's texels -> a picture of the object"},
             inputs(kNestedScales, shown.materials, kFragments, kFilledPlanes), outputs(kPoster),
             read_of(o, o.poster), {"libjpeg-turbo"}, make_poster),
-      stage({"proxies", kProxiesVersion, "S_0 -> small GLBs with atlases and textures of their own"},
+      stage({"proxies", kProxiesVersion, "S_0 and scales -> the whole object in small GLBs"},
             inputs(kNestedScales, shown.materials, shown.images, kFragments, kFilledPlanes),
-            outputs(kProxies), read_of(o, o.proxies), {"draco", "libwebp", "meshoptimizer"}, make_proxies),
+            outputs(kProxies), read_of(o, o.proxies), {"draco", "libjpeg-turbo", "libwebp", "meshoptimizer"},
+            make_proxies),
       package_stage(o),
   };
   return with_atlas(std::move(table), o);

@@ -39,7 +39,8 @@ bool is_flat(Vec3f a, Vec3f b, Vec3f c);
 ScaleFile write_scale(const ScaleCoding& coding, const NestedScale& scale,
                       const std::vector<Material>& materials, const GlbImages& images);
 
-/// The mesh of a scale as a reader of its file gets it: on the grids, with normals of so many bits.
+/// The mesh of a scale about as a reader of its file gets it: on the grids, with normals of so many bits,
+/// which Draco rounds a little otherwise. Tangents and colours stay as they are.
 Mesh rounded_scale(Mesh mesh, const ScaleCoding& coding);
 
 }  // namespace texmesh

@@ -50,6 +50,7 @@ void note_none(Notes& notes, int bytes, const std::string& why) {
 
 constexpr const char* kScaleWins = "a scale with the source's atlas looks better for the same bytes";
 constexpr const char* kWholeTakesFewer = "the whole object takes fewer";
+constexpr const char* kDoNotFit = "mesh and pictures do not fit";
 constexpr const char* kLittleBetter = "a scale of so many looks little better than the proxy before it";
 constexpr const char* kOfSource = "proxies take at most 35 % of the source";
 constexpr const char* kSmallSource = "the smallest proxy would take more than 15 % of the source";
@@ -59,9 +60,9 @@ std::uint32_t most_triangles(const Mesh& mesh, int most_bytes) {
       std::min<double>(most_bytes / kLeastBytesPerTriangle, static_cast<double>(mesh.triangles.size())));
 }
 
-Mesh baked_mesh(const NestedScales& scales, const RunContext& context) {
-  const double diagonal = bounding_box(scales.mesh.positions).diagonal();
-  return lit_scale(scales, stand_in_scale(scales, kMostBaked, kFarthestBaked * diagonal), context);
+/// The scale that is baked: S_0, or what stands for it.
+std::size_t baked_scale(const NestedScales& scales) {
+  return stand_in_scale(scales, kMostBaked, kFarthestBaked * bounding_box(scales.mesh.positions).diagonal());
 }
 
 /// What the files of a model that proxies stand for take.
@@ -136,6 +137,7 @@ struct Candidate {
   ProxyForm form;
   FlipSum flip;           // at the middle height
   bool is_scale = false;  // not baked
+  std::optional<FlipSum> large;
 };
 
 /// Takes the place of `best` where it looks better, worth its form.
@@ -151,7 +153,7 @@ void compete(const ProxySubject& subject, const ReferenceViews& views, BakedProx
   const double hopeless = best.made ? kFarBehind * best.flip.mean() / worth + kNoise : 1;
   const FlipSum flip =
       picture_loss(views, made->shown.scene(), made->shown.shown.textures, context, hopeless);
-  if (!best.made || flip.mean() * worth < best.flip.mean()) best = {std::move(made), form, flip};
+  if (!best.made || flip.mean() * worth < best.flip.mean()) best = {std::move(made), form, flip, false, {}};
 }
 
 /// FLIP likes facets of a smooth object even where they are large (a bust's .107 for .115 at 20 kB); who
@@ -207,6 +209,7 @@ bool cannot_win(CompetingScales& scales, int bytes, const Learned& learned, cons
 struct KeptProxy {
   MadeProxy made;
   FlipSum middle, large;
+  bool is_scale = false;
 };
 
 /// Tries one size after the other, smallest first.
@@ -222,6 +225,9 @@ class ProxySizes {
         large_(reference_views(subject.mesh, subject.shown, kLargePx, context)),
         scales_(source, sizes.back()),
         competitors_(source.scales, subject.shown, middle_) {}
+
+  ProxySizes(const ProxySizes&) = delete;
+  ProxySizes& operator=(const ProxySizes&) = delete;
 
   /// Why the size gets no proxy; null where it does.
   const char* add(int bytes);
@@ -247,7 +253,8 @@ class ProxySizes {
 };
 
 /// A scale or baked, by pictures in which both show their texels. Bakes only what may be nearer: FLIP of six
-/// scans' proxies falls with at most this power of the bytes.
+/// scans' proxies falls with at most this power of the bytes, and nothing where a scale in a plan is farther
+/// ahead than that.
 Candidate ProxySizes::best_candidate(int bytes) {
   constexpr double kMostPower = 0.63;
   const bool first = kept_.empty();
@@ -259,12 +266,14 @@ Candidate ProxySizes::best_candidate(int bytes) {
     const double share = learned_.last_bytes / bytes;
     if (learned_.last_flip * portable::pow(share, kMostPower) > scale.flip.mean()) return scale;
   }
+  if (!scale.made && !first && scales_compete() && cannot_win(competitors_, bytes, learned_, context_))
+    return {};
   Candidate baked = best_of(subject_, middle_, surfaces_, bytes, first, learned_, context_);
   if (!baked.made) return scale;
   learned_.last_bytes = (first ? kFirstShare : 1) * bytes, learned_.last_flip = baked.flip.mean();
-  const bool is_nearer =
-      scale.made && flip_of(*scale.made, large_).mean() < flip_of(*baked.made, large_).mean();
-  return is_nearer ? std::move(scale) : std::move(baked);
+  if (!scale.made) return baked;
+  scale.large = flip_of(*scale.made, large_), baked.large = flip_of(*baked.made, large_);
+  return scale.large->mean() < baked.large->mean() ? std::move(scale) : std::move(baked);
 }
 
 /// Why the candidate does not stay; null where it does. Plans code a scale's texels apart and pay for tables,
@@ -272,8 +281,10 @@ Candidate ProxySizes::best_candidate(int bytes) {
 const char* ProxySizes::why_not(const Candidate& best, const FlipSum& large) {
   const bool first = kept_.empty();
   const auto size = static_cast<double>(best.made->proxy.glb.size());
-  learned_.holds_whole_object = !first && size <= static_cast<double>(kept_.back().made.proxy.glb.size());
-  if (learned_.holds_whole_object) return kWholeTakesFewer;
+  if (!first && size <= static_cast<double>(kept_.back().made.proxy.glb.size())) {
+    learned_.holds_whole_object = kept_.back().is_scale == best.is_scale;
+    return kWholeTakesFewer;
+  }
   if (!scales_compete()) return nullptr;
   if (best.is_scale) return large.mean() > kWorthIts * kept_.back().large.mean() ? kLittleBetter : nullptr;
   const auto rival_bytes = static_cast<std::uint64_t>((first ? kFirstShare : 1) * size);
@@ -287,15 +298,12 @@ const char* ProxySizes::why_not(const Candidate& best, const FlipSum& large) {
 const char* ProxySizes::add(int bytes) {
   if (learned_.holds_whole_object) return kWholeTakesFewer;
   if (learned_.all_bytes + kOverAsked * bytes > subject_.most_bytes) return kOfSource;
-  if (!kept_.empty() && bytes < kScaleFrom && scales_compete() &&
-      cannot_win(competitors_, bytes, learned_, context_))
-    return kScaleWins;
   Candidate best = best_candidate(bytes);
-  if (!best.made) return "mesh and pictures do not fit";
-  FlipSum large = flip_of(*best.made, large_);
+  if (!best.made) return kept_.empty() || !scales_compete() ? kDoNotFit : kScaleWins;
+  FlipSum large = best.large ? std::move(*best.large) : flip_of(*best.made, large_);
   if (const char* why = why_not(best, large)) return why;
   learned_.all_bytes += static_cast<double>(best.made->proxy.glb.size());
-  kept_.push_back({std::move(*best.made), best.flip, std::move(large)});
+  kept_.push_back({std::move(*best.made), best.flip, std::move(large), best.is_scale});
   return nullptr;
 }
 
@@ -337,7 +345,8 @@ Proxies make_proxies(const NestedScales& scales, const std::vector<Material>& ma
   if (sizes.empty()) return out;
   RunContext inner = context;
   inner.progress = nullptr;
-  const Mesh mesh = baked_mesh(scales, inner);
+  const std::size_t baked = baked_scale(scales);
+  const Mesh mesh = lit_scale(scales, baked, inner);
   const ShownMaterials shown =
       shown_materials(materials, fragments, pixels, mesh, enough_side_px(materials), inner);
   MaterialGroups groups = find_groups(mesh, shown.materials);
@@ -349,7 +358,7 @@ Proxies make_proxies(const NestedScales& scales, const std::vector<Material>& ma
   }
   const ProxySubject subject =
       subject_of(mesh, shown, groups, source, options.mode, most_bytes(scales, images, options.mode));
-  ProxySizes tried(subject, {scales, materials, images, mesh, shown}, sizes, inner);
+  ProxySizes tried(subject, {scales, materials, images, mesh, baked, shown}, sizes, inner);
   // A size takes about as long as its square root says; pictures of those that stay come after them.
   constexpr double kForSizes = .9;
   double done = 0, all = 0;

@@ -44,8 +44,8 @@ struct ProxiesOptions {
 /// - File: GLB with images inside: WebP where it is baked, else JPEG, and WebP where there is alpha. The
 ///   smallest one, which clients show before they have a decoder, is baked and coded by
 ///   EXT_meshopt_compression, KHR_mesh_quantization and KHR_texture_transform, larger ones by
-///   KHR_draco_mesh_compression. It is at most 2 % larger than its size asks for. So the default's smallest
-///   one lies with a manifest of 8 kB in the 45,056 bytes of a client's first request.
+///   KHR_draco_mesh_compression. A file is at most 2 % larger than its size asks for. So the default's
+///   smallest one lies with a manifest of 8 kB in the 45,056 bytes of a client's first request.
 /// - Losses: FLIP of lit pictures beside S_0's (stages/render in the studio's light) at three displayed
 ///   heights, where the height is that of the bounding box's longest side; four views, at the largest two.
 /// - Automatic choice, each size by itself: a baked one is left out where plans show something better for the

@@ -1,6 +1,7 @@
 #include "stages/proxies/source_textures.h"
 
 #include "format/base/portable_math.h"
+#include "format/documents/manifest.h"
 #include "stages/image/resize.h"
 #include "stages/image/webp.h"
 #include "stages/jpeg/jpeg.h"
@@ -11,7 +12,6 @@ namespace {
 
 constexpr std::size_t kMostGroupsOfOne = 6;
 constexpr std::uint32_t kLeastSide = 8;
-constexpr double kHeaderBytes = 400;  // of an image: its own and what the document says of it
 constexpr std::uint64_t kMostPixels = std::uint64_t{1} << 28;
 
 const TextureRef& reference_of(const Material& m, TextureUse use) {
@@ -34,6 +34,7 @@ const TextureRef& reference_of(const Material& m, TextureUse use) {
 std::array<Pixels, 2> split_alpha(const Pixels& from) {
   std::array<Pixels, 2> out{Pixels{from.width_px, from.height_px, 3, {}},
                             Pixels{from.width_px, from.height_px, 1, {}}};
+  out[0].data.reserve(3 * from.data.size() / from.channels);
   for (std::size_t i = 0; i < from.data.size(); i += from.channels) {
     for (std::size_t k = 0; k < 3; ++k) out[0].data.push_back(from.data[i + (from.channels == 4 ? k : 0)]);
     out[1].data.push_back(from.data[i + from.channels - 1]);
@@ -59,7 +60,7 @@ Pixels smaller(const Pixels& from, Vec2<std::uint32_t> side, Averaging kind) {
   return joined_alpha(to_side(parts[0], kind), to_side(parts[1], Averaging::kNumbers));
 }
 
-double joined(double flip) { return flip * flip; }
+double squared(double flip) { return flip * flip; }
 
 /// Plans that no mix of two others beats, by rising bytes.
 std::vector<TexturePlan> convex(std::vector<TexturePlan> plans) {
@@ -78,11 +79,11 @@ std::vector<TexturePlan> convex(std::vector<TexturePlan> plans) {
 
 }  // namespace
 
-SourceTextures::SourceTextures(const Mesh& mesh, const std::vector<Material>& materials,
+SourceTextures::SourceTextures(const Mesh& finest, const std::vector<Material>& materials,
                                const ShownMaterials& shown)
     : shown_(shown) {
   std::vector<bool> used(materials.size());
-  for (const std::uint16_t m : mesh.triangle_material) used.at(m) = true;
+  for (const std::uint16_t m : finest.triangle_material) used.at(m) = true;
   std::map<std::uint32_t, Group> by_image;
   for (std::size_t u = 0; u < kTextureUses; ++u)
     for (std::size_t m = 0; m < materials.size(); ++m) {
@@ -102,6 +103,22 @@ SourceTextures::SourceTextures(const Mesh& mesh, const std::vector<Material>& ma
     else
       like->members.push_back(std::move(group.members.front()));
   }
+}
+
+bool SourceTextures::has(std::int32_t image) const {
+  return std::ranges::any_of(groups_, [&](const Group& group) {
+    return std::ranges::any_of(group.members,
+                               [&](const Member& m) { return static_cast<std::int64_t>(m.image) == image; });
+  });
+}
+
+bool SourceTextures::keep_to_gpu_estimate(const std::vector<int>& steps, double squares) const {
+  double all = 0, side = 0;
+  for (std::size_t g = 0; g < groups_.size(); ++g) {
+    all += texels(groups_[g], steps[g]);
+    side = std::max(side, static_cast<double>(side_px(groups_[g], steps[g])));
+  }
+  return all <= squares * side * side;
 }
 
 Vec2<std::uint32_t> SourceTextures::sides(const Member& member, int steps) const {
@@ -181,40 +198,40 @@ class GroupPictures {
  public:
   GroupPictures(const Mesh& mesh, SourceTextures& textures, const ReferenceViews& views,
                 const RunContext& context)
-      : mesh_(mesh), textures_(textures), views_(views), context_(context) {
+      : mesh_(mesh), textures_(textures), views_(views), context_(context), all_(textures.full().textures) {
     const RenderScene scene = render_scene(mesh, textures.full().materials, 0);
     for (const ReferenceViews::View& v : views.views) seen_.push_back(v.seen(scene, context));
   }
 
   /// Sets the losses.
   void look_at(const SourceTextures::Group& group, std::vector<TexturePlan>& plans) {
-    std::vector<RenderTexture> textures = textures_.full().textures;
+    all_.resize(textures_.full().textures.size());
     std::vector<std::vector<RenderMaterial>> materials(plans.size(), textures_.full().materials);
     for (std::size_t p = 0; p < plans.size(); ++p) {
       plans[p].bytes = 0;
       for (const SourceTextures::Member& m : group.members) {
         const CodedTexture coded = textures_.coded(m, group.use, plans[p].steps, plans[p].quality, true);
-        plans[p].bytes += static_cast<double>(coded.file.size()) + kHeaderBytes;
+        plans[p].bytes += static_cast<double>(coded.file.size()) + kFrameOfImage;
         for (const std::size_t t : m.textures) {
-          replace(materials[p], t, textures.size());
-          textures.push_back(textures_.shown(coded, t, context_));
+          replace(materials[p], t, all_.size());
+          all_.push_back(textures_.shown(coded, t, context_));
         }
       }
     }
     std::vector<const std::vector<RenderMaterial>*> variants;
     for (const auto& m : materials) variants.push_back(&m);
     std::vector<FlipSum> sums(plans.size());
-    RenderScene scene = render_scene(mesh_, materials.front(), textures.size());
+    RenderScene scene = render_scene(mesh_, materials.front(), all_.size());
     for (std::size_t v = 0; v < seen_.size(); ++v) {
       const PictureVariants pictures =
-          shade_variants(scene, seen_[v], variants, textures, views_.environment, context_);
+          shade_variants(scene, seen_[v], variants, all_, views_.environment, context_);
       Picture picture;
       for (std::size_t p = 0; p < plans.size(); ++p) {
         pictures.put(p, picture);
         sums[p].add(compare_flip(views_.views[v].picture, prepare_flip(picture)));
       }
     }
-    for (std::size_t p = 0; p < plans.size(); ++p) plans[p].loss = joined(sums[p].mean());
+    for (std::size_t p = 0; p < plans.size(); ++p) plans[p].loss = squared(sums[p].mean());
   }
 
  private:
@@ -227,6 +244,7 @@ class GroupPictures {
   SourceTextures& textures_;
   const ReferenceViews& views_;
   const RunContext& context_;
+  std::vector<RenderTexture> all_;  // as they are, and behind them those of the group's files
   std::vector<Visibility> seen_;
 };
 
@@ -238,7 +256,10 @@ std::vector<TexturePlan> plans_of(const SourceTextures& textures, const SourceTe
   constexpr std::array<int, 3> kQualities{30, 60, 85};
   std::vector<TexturePlan> out;
   int steps = 0;
-  while (textures.texels(group, steps) > kMostTexelsPerByte * most_bytes) ++steps;
+  while (textures.side_px(group, steps) > kLeastSide &&
+         (textures.side_px(group, steps) > kMaxProxyTexturePx ||
+          textures.texels(group, steps) > kMostTexelsPerByte * most_bytes))
+    ++steps;
   const auto last_side = [&](int s) { return textures.side_px(group, s) <= kLeastSide; };
   for (std::size_t i = 0; i < kMostSizes && !last_side(steps); ++i, steps += 2)
     for (const int quality : kQualities) out.push_back({steps, quality});

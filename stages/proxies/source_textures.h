@@ -4,12 +4,15 @@
 
 namespace texmesh {
 
-/// How an image is coded. Colours: JPEG of YCbCr 4:4:4; numbers: JPEG of three channels; with alpha: WebP.
+/// How an image is coded. Colours: JPEG of YCbCr 4:4:4; numbers: JPEG of channels as they are; with alpha:
+/// WebP.
 struct CodedTexture {
   const char* mime_type = "image/jpeg";
   Bytes file;
   std::uint32_t width_px = 0, height_px = 0;
 };
+
+inline constexpr double kFrameOfImage = 330;  // bytes that a document says of an image
 
 /// What becomes of the images of a group.
 struct TexturePlan {
@@ -17,7 +20,6 @@ struct TexturePlan {
   int quality = 0;   // 1..100
   double bytes = 0;  // of all images of the group
   double loss = 0;   // square of the FLIP that they alone make
-  auto operator<=>(const TexturePlan&) const = default;
 };
 
 /// The images that a model's materials read, in groups that are treated alike: each image is one, or of many
@@ -32,10 +34,14 @@ class SourceTextures {
     TextureUse use = TextureUse::kBaseColour;  // of its first reader
     std::vector<Member> members;
   };
-  /// Both must outlive it. Materials without a triangle in the mesh do not count.
-  SourceTextures(const Mesh& mesh, const std::vector<Material>& materials, const ShownMaterials& shown);
+  /// `shown` must outlive it. Materials without a triangle in S_0 do not count.
+  SourceTextures(const Mesh& finest, const std::vector<Material>& materials, const ShownMaterials& shown);
 
   const std::vector<Group>& groups() const { return groups_; }
+  bool has(std::int32_t image) const;
+  /// Whether clients' estimate of a proxy's textures, four squares of the longest side, holds all of them at
+  /// these steps, by group.
+  bool keep_to_gpu_estimate(const std::vector<int>& steps, double squares = 4) const;
   double texels(const Group& group, int steps) const;
   /// Longest side of an image of the group.
   std::uint32_t side_px(const Group& group, int steps) const;

@@ -1,6 +1,6 @@
 // A scale as a proxy. Its story:
 // 1. Pictures of S_0 at kLargePx, a quarter of the rows, tell what each image loses in several sizes and
-// qualities, with everything else at its best (TextureCurves), and what each scale loses with whole images.
+// qualities, with everything else at its best (TextureCurves), and what scales lose with whole images.
 // 2. What a mesh loses by its coding, and the bytes that this takes, are known from other scans (kCodings).
 // 3. Losses in the same pixels join about as the sum of their squares. So for every number of bytes the mesh
 // and the images are chosen by sums: what the mesh leaves is dealt out along the curves.
@@ -25,9 +25,9 @@ constexpr std::array<MeshCoding512, 4> kCodings{
     {{10, 10, 7, 270e-6, 0.81}, {11, 11, 7, 150e-6, 0.88}, {12, 12, 8, 60e-6, 1}, {13, 13, 8, 35e-6, 1.1}}};
 constexpr double kOtherScale = 1.12;  // times the bytes: nearer ones are not looked at
 constexpr int kMeshAttempts = 3;
-constexpr double kFrameOfImage = 330;  // bytes of an image in the document
 constexpr int kMostQualityOfImage = 97;
-constexpr double kMissed = 0.06;  // of a mesh' bytes
+constexpr double kAimedFull = 0.98, kNearlyFull = 0.96;  // of the bytes for images
+constexpr double kMissed = 0.06;                    // of a mesh' bytes
 
 const char* use_name(TextureUse use) {
   switch (use) {
@@ -42,14 +42,26 @@ const char* use_name(TextureUse use) {
   }
 }
 
-/// Clients count a proxy's textures as four squares of its longest side.
-bool keeps_to_gpu_estimate(const std::vector<ProxyTexture>& textures) {
-  double texels = 0, side = 0;
-  for (const ProxyTexture& t : textures) {
-    texels += static_cast<double>(t.width_px) * t.height_px;
-    side = std::max({side, static_cast<double>(t.width_px), static_cast<double>(t.height_px)});
-  }
-  return texels <= 4 * side * side;
+/// Whether the file has no place for so many images, or clients do not count them.
+bool has_too_many(const SourceTextures& textures, double most_bytes) {
+  constexpr double kFarTooMany = 8;
+  std::size_t images = 0;
+  for (const SourceTextures::Group& group : textures.groups()) images += group.members.size();
+  return static_cast<double>(images) * kFrameOfImage > most_bytes ||
+         !textures.keep_to_gpu_estimate(std::vector<int>(textures.groups().size()), kFarTooMany);
+}
+
+std::vector<int> steps_of(const TextureCurves::Dealt& dealt) {
+  std::vector<int> out;
+  for (const TexturePlan& plan : dealt.plans) out.push_back(plan.steps);
+  return out;
+}
+
+/// Bytes of the JSON of a GLB.
+double json_bytes(const Bytes& glb) {
+  std::uint32_t out = 0;
+  for (std::size_t k = 0; k < 4; ++k) out |= std::uint32_t{glb.at(12 + k)} << 8 * k;
+  return out;
 }
 
 double cells_of(int bits) { return static_cast<double>((std::uint32_t{1} << bits) - 1); }
@@ -58,9 +70,19 @@ double cells_of(int bits) { return static_cast<double>((std::uint32_t{1} << bits
 
 WholeScales::WholeScales(const WholeScaleSource& source, double most_bytes)
     : source_(source),
+      materials_(source.materials),
       most_bytes_(most_bytes),
-      textures_(source.mesh, source.materials, source.shown),
-      estimates_(estimated_mesh_bytes(source.scales)) {}
+      textures_(source.scales.mesh, source.materials, source.shown),
+      hopeless_(has_too_many(textures_, most_bytes)),
+      estimates_(estimated_mesh_bytes(source.scales)) {
+  // Without its texture a factor would hold everywhere: all of an object would be glass.
+  for (Material& m : materials_)
+    std::erase_if(m.extensions, [&](const MaterialExtension& extension) {
+      return std::ranges::any_of(extension.textures, [&](const ExtensionTexture& t) {
+        return t.texture.used() && !textures_.has(t.texture.image);
+      });
+    });
+}
 
 void WholeScales::measure(const RunContext& context) {
   if (curves_) return;
@@ -70,7 +92,7 @@ void WholeScales::measure(const RunContext& context) {
 
 double WholeScales::loss_of(std::size_t scale, const RunContext& context) {
   const auto [at, is_new] = scale_losses_.try_emplace(scale, 0.0);
-  if (!is_new || scale == 0) return at->second;
+  if (!is_new || scale <= source_.stand_in) return at->second;
   const Mesh mesh = lit_scale(source_.scales, scale, context);
   const RenderScene scene = render_scene(mesh, source_.shown.materials, source_.shown.textures.size());
   const double flip = picture_loss(*views_, scene, source_.shown.textures, context).mean();
@@ -78,9 +100,8 @@ double WholeScales::loss_of(std::size_t scale, const RunContext& context) {
 }
 
 double WholeScales::mesh_bytes(const MeshChoice& mesh) const {
-  if (const auto known = files_.find(mesh); known != files_.end())
-    return static_cast<double>(known->second.bytes);
-  return of_estimate_ * kCodings[mesh.coding].bytes * estimates_[mesh.scale];
+  if (const auto known = file_bytes_.find(mesh); known != file_bytes_.end()) return known->second;
+  return document_bytes_ + of_estimate_ * kCodings[mesh.coding].bytes * estimates_[mesh.scale];
 }
 
 std::optional<WholeScales::Choice> WholeScales::best_with(std::size_t scale, double bytes,
@@ -89,7 +110,7 @@ std::optional<WholeScales::Choice> WholeScales::best_with(std::size_t scale, dou
   for (std::size_t c = 0; c < kCodings.size(); ++c) {
     const MeshChoice mesh{scale, c};
     auto textures = curves_->deal(bytes - mesh_bytes(mesh));
-    if (!textures) continue;
+    if (!textures || !textures_.keep_to_gpu_estimate(steps_of(*textures))) continue;
     const double loss = kCodings[c].loss + textures->loss;
     if (!best || loss < best->loss) best = Choice{mesh, std::move(*textures), loss};
   }
@@ -116,7 +137,7 @@ std::optional<WholeScales::Choice> WholeScales::choose(double bytes, const RunCo
       if (!found && finer) break;
       if (found && (!best || found->loss < best->loss))
         best = std::move(found), worse = 0;
-      else
+      else if (found)
         ++worse;
     }
   }
@@ -125,7 +146,7 @@ std::optional<WholeScales::Choice> WholeScales::choose(double bytes, const RunCo
 
 ScaleCoding WholeScales::coding_of(const MeshChoice& mesh, const RunContext& context) const {
   const MeshCoding512& how = kCodings[mesh.coding];
-  ScaleCoding out = make_coding(source_.scales.mesh, source_.materials, source_.images, ScalesOptions{});
+  ScaleCoding out = make_coding(source_.scales.mesh, materials_, source_.images, ScalesOptions{});
   out.frames = scale_frames(source_.scales, mesh.scale, context);
   out.options.normal_bits = how.normal_bits;
   coarsen_positions(out.position, cells_of(how.position_bits), out.mesh,
@@ -134,27 +155,26 @@ ScaleCoding WholeScales::coding_of(const MeshChoice& mesh, const RunContext& con
   return out;
 }
 
-const WholeScales::MeshFile& WholeScales::mesh_file(const MeshChoice& mesh, const RunContext& context) {
-  const auto [at, is_new] = files_.try_emplace(mesh);
-  if (!is_new) return at->second;
-  const ScaleCoding coding = coding_of(mesh, context);
-  const NestedScale& scale = source_.scales.scales[mesh.scale];
-  at->second.bytes = write_scale(coding, scale, source_.materials, {}).glb.size();
-  at->second.shown = rounded_scale(lit_scale(source_.scales, mesh.scale, context), coding);
-  of_estimate_ =
-      static_cast<double>(at->second.bytes) / (kCodings[mesh.coding].bytes * estimates_[mesh.scale]);
-  return at->second;
+void WholeScales::code_mesh_of(const MeshChoice& mesh, const RunContext& context) {
+  const auto [at, is_new] = file_bytes_.try_emplace(mesh, 0.0);
+  if (!is_new) return;
+  const Bytes glb =
+      write_scale(coding_of(mesh, context), source_.scales.scales[mesh.scale], materials_, {}).glb;
+  at->second = static_cast<double>(glb.size());
+  document_bytes_ = json_bytes(glb);
+  of_estimate_ = (at->second - document_bytes_) / (kCodings[mesh.coding].bytes * estimates_[mesh.scale]);
 }
 
 /// All images with qualities that are so much higher.
-WholeScales::CodedImages WholeScales::coded_images(const TextureCurves::Dealt& dealt, int higher) {
+WholeScales::CodedImages WholeScales::coded_images(const TextureCurves::Dealt& dealt, int higher,
+                                                   bool quick) {
   const auto& groups = textures_.groups();
   CodedImages out;
   for (std::size_t g = 0; g < groups.size(); ++g)
     for (const SourceTextures::Member& m : groups[g].members) {
       const TexturePlan& plan = dealt.plans[g];
       const int quality = std::clamp(plan.quality + higher, 1, kMostQualityOfImage);
-      CodedTexture coded = textures_.coded(m, groups[g].use, plan.steps, quality, false);
+      CodedTexture coded = textures_.coded(m, groups[g].use, plan.steps, quality, quick);
       out.rows.push_back({use_name(groups[g].use), coded.width_px, coded.height_px, coded.file.size()});
       out.bytes += static_cast<double>(coded.file.size()) + kFrameOfImage;
       out.files.push_back({m.image, 0, coded.mime_type, std::move(coded.file), {}});
@@ -162,39 +182,54 @@ WholeScales::CodedImages WholeScales::coded_images(const TextureCurves::Dealt& d
   return out;
 }
 
-/// The images at qualities that fill so many bytes, all of them higher or lower than was dealt.
-WholeScales::CodedImages WholeScales::filled(const TextureCurves::Dealt& dealt, double bytes) {
-  constexpr double kFull = 0.98, kQualitiesOfE = 30;  // so many above it take e times the bytes
+/// How much higher qualities may be than was dealt where images of one scan fill so many bytes.
+int WholeScales::higher_for(const TextureCurves::Dealt& dealt, double bytes) {
+  constexpr double kQualitiesOfE = 30;  // so many above it take e times the bytes
   constexpr int kQualityTries = 5;
-  std::optional<CodedImages> best;
-  int low = -kMostQualityOfImage, high = kMostQualityOfImage, higher = 0;
+  int low = -kMostQualityOfImage, high = kMostQualityOfImage, higher = 0, best = low;
   for (int i = 0; i < kQualityTries && low <= high; ++i) {
-    CodedImages coded = coded_images(dealt, higher);
-    const double fill = coded.bytes / std::max(bytes, 1.0);
+    const double fill = coded_images(dealt, higher, true).bytes / std::max(bytes, 1.0);
     (fill <= 1 ? low : high) = fill <= 1 ? higher + 1 : higher - 1;
-    if (fill <= 1) best = std::move(coded);
-    if (fill <= 1 && fill >= kFull) break;
-    const double step = -kQualitiesOfE * portable::log(fill / ((1 + kFull) / 2));
+    if (fill <= 1) best = higher;
+    if (fill <= 1 && fill >= kAimedFull) break;
+    const double step = -kQualitiesOfE * portable::log(fill / ((1 + kAimedFull) / 2));
     higher = std::clamp(higher + static_cast<int>(std::floor(step + 0.5)), low, std::max(low, high));
   }
-  return best ? std::move(*best) : coded_images(dealt, -kMostQualityOfImage);
+  return best;
+}
+
+/// The images at qualities that fill so many bytes. Several scans take a share of the bytes of one, which the
+/// file before tells: coding takes three times as long.
+WholeScales::CodedImages WholeScales::filled(const TextureCurves::Dealt& dealt, double bytes) {
+  constexpr int kFiles = 3;
+  if (dealt.plans.empty()) return {};
+  std::optional<CodedImages> best;
+  for (int i = 0; i < kFiles; ++i) {
+    const int higher = higher_for(dealt, bytes / scans_share_);
+    CodedImages coded = coded_images(dealt, higher, false);
+    const double fill = coded.bytes / std::max(bytes, 1.0);
+    scans_share_ = std::clamp(coded.bytes / coded_images(dealt, higher, true).bytes, 0.5, 1.2);
+    if (fill <= 1 && (!best || coded.bytes > best->bytes)) best = std::move(coded);
+    if (best && (fill >= kNearlyFull || i > 0)) break;
+  }
+  return best ? std::move(*best) : coded_images(dealt, -kMostQualityOfImage, false);
 }
 
 std::optional<MadeProxy> WholeScales::finished(const Choice& choice, std::uint64_t bytes,
                                                const RunContext& context) {
-  const MeshFile& mesh = mesh_file(choice.mesh, context);
-  CodedImages images = filled(choice.textures, static_cast<double>(bytes) - static_cast<double>(mesh.bytes));
+  const double left = static_cast<double>(bytes) - mesh_bytes(choice.mesh);
+  CodedImages images = filled(choice.textures, left);
+  const ScaleCoding coding = coding_of(choice.mesh, context);
   MadeProxy out;
-  ScaleFile made = write_scale(coding_of(choice.mesh, context), source_.scales.scales[choice.mesh.scale],
-                               source_.materials, images.files);
+  ScaleFile made = write_scale(coding, source_.scales.scales[choice.mesh.scale], materials_, images.files);
   if (static_cast<double>(made.glb.size()) > kOverAsked * static_cast<double>(bytes)) return std::nullopt;
   out.proxy.glb = std::move(made.glb);
   out.proxy.target_bytes = bytes;
   out.proxy.triangles = made.triangles, out.proxy.vertices = made.vertices;
   out.proxy.textures = std::move(images.rows);
-  if (!keeps_to_gpu_estimate(out.proxy.textures)) return std::nullopt;
-  out.shown.mesh = mesh.shown;
-  out.shown.shown = source_.shown;
+  out.shown.mesh = rounded_scale(lit_scale(source_.scales, choice.mesh.scale, context), coding);
+  out.shown.shown.materials = source_.shown.materials;
+  out.shown.shown.textures.resize(source_.shown.textures.size());
   std::size_t i = 0;
   for (const SourceTextures::Group& group : textures_.groups())
     for (const SourceTextures::Member& m : group.members) {
@@ -206,6 +241,7 @@ std::optional<MadeProxy> WholeScales::finished(const Choice& choice, std::uint64
 }
 
 std::optional<MadeProxy> WholeScales::of(std::uint64_t bytes, const RunContext& context) {
+  if (hopeless_) return std::nullopt;
   measure(context);
   const auto target = static_cast<double>(bytes);
   std::optional<Choice> choice;
@@ -213,11 +249,12 @@ std::optional<MadeProxy> WholeScales::of(std::uint64_t bytes, const RunContext& 
     choice = choose(target, context);
     if (!choice) return std::nullopt;
     const double thought = mesh_bytes(choice->mesh);
-    const auto found = static_cast<double>(mesh_file(choice->mesh, context).bytes);
+    code_mesh_of(choice->mesh, context);
+    const double found = mesh_bytes(choice->mesh);
     if (std::fabs(found - thought) <= kMissed * found) break;
   }
-  auto textures = curves_->deal(target - static_cast<double>(mesh_file(choice->mesh, context).bytes));
-  if (!textures) return std::nullopt;
+  auto textures = curves_->deal(target - mesh_bytes(choice->mesh));
+  if (!textures || !textures_.keep_to_gpu_estimate(steps_of(*textures))) return std::nullopt;
   choice->textures = std::move(*textures);
   return finished(*choice, bytes, context);
 }

@@ -11,7 +11,8 @@ struct WholeScaleSource {
   const NestedScales& scales;
   const std::vector<Material>& materials;
   const std::vector<Image>& images;
-  const Mesh& mesh;  // S_0, or what stands for it
+  const Mesh& mesh;      // S_0, or the scale that stands for it
+  std::size_t stand_in;  // its index; finer ones lose nothing
   const ShownMaterials& shown;
 };
 
@@ -22,12 +23,12 @@ class WholeScales {
  public:
   /// `most_bytes`: of the largest file.
   WholeScales(const WholeScaleSource& source, double most_bytes);
-  /// The file of at most so many bytes that is likely to look best, by sums of what its mesh and its images
-  /// lose in pictures of kLargePx. Nothing where none fits.
+  /// The file of about so many bytes, at most kOverAsked times, that is likely to look best, by sums of what
+  /// its mesh and its images lose in pictures of kLargePx. Nothing where none fits.
   std::optional<MadeProxy> of(std::uint64_t bytes, const RunContext& context);
 
  private:
-  /// How finely a mesh is coded, 0 .. the number of kCodings - 1.
+  /// A scale, and how finely it is coded, 0 .. the number of kCodings - 1.
   struct MeshChoice {
     std::size_t scale = 0, coding = 0;
     auto operator<=>(const MeshChoice&) const = default;
@@ -37,35 +38,36 @@ class WholeScales {
     TextureCurves::Dealt textures;
     double loss = 0;
   };
-  struct MeshFile {
-    std::size_t bytes = 0;  // of the whole file without images
-    Mesh shown;
-  };
   void measure(const RunContext& context);
   double loss_of(std::size_t scale, const RunContext& context);
   double mesh_bytes(const MeshChoice& mesh) const;
   std::optional<Choice> best_with(std::size_t scale, double bytes, const RunContext& context);
   std::optional<Choice> choose(double bytes, const RunContext& context);
   ScaleCoding coding_of(const MeshChoice& mesh, const RunContext& context) const;
-  const MeshFile& mesh_file(const MeshChoice& mesh, const RunContext& context);
+  void code_mesh_of(const MeshChoice& mesh, const RunContext& context);
   struct CodedImages {
     GlbImages files;
     std::vector<ProxyTexture> rows;
     double bytes = 0;  // with what the document says of them
   };
-  CodedImages coded_images(const TextureCurves::Dealt& dealt, int higher);
+  CodedImages coded_images(const TextureCurves::Dealt& dealt, int higher, bool quick);
+  int higher_for(const TextureCurves::Dealt& dealt, double bytes);
   CodedImages filled(const TextureCurves::Dealt& dealt, double bytes);
   std::optional<MadeProxy> finished(const Choice& choice, std::uint64_t bytes, const RunContext& context);
 
   const WholeScaleSource source_;
+  std::vector<Material> materials_;  // without extensions whose images no core texture reads
   double most_bytes_;
   SourceTextures textures_;
+  bool hopeless_;              // more images than clients count
+  double scans_share_ = 0.95;  // of the bytes of one scan, what images of several take
   std::optional<ReferenceViews> views_;
   std::optional<TextureCurves> curves_;
   std::map<std::size_t, double> scale_losses_;  // squares of FLIP, by scale
-  std::map<MeshChoice, MeshFile> files_;
-  std::vector<double> estimates_;  // of meshes' bytes, by scale
-  double of_estimate_ = 0.62;      // what a mesh of the usual coding takes of them
+  std::map<MeshChoice, double> file_bytes_;     // of files without images
+  std::vector<double> estimates_;               // of meshes' bytes, by scale
+  double of_estimate_ = 0.62;                   // what a mesh of the usual coding takes of them
+  double document_bytes_ = 1500;                // of a file without images, besides its mesh
 };
 
 }  // namespace texmesh

@@ -34,7 +34,7 @@ std::size_t kept_from(const RenderTexture& texture, std::size_t dropped) {
 /// Others in each view.
 std::vector<std::uint8_t> quarter_of_bands(std::uint32_t side_px, int view) {
   std::vector<std::uint8_t> out((side_px + kBandPx - 1) / kBandPx);
-  for (std::size_t b = 0; b < out.size(); ++b) out[b] = b % 4 == static_cast<std::size_t>(1 + view) % 4;
+  for (std::size_t b = 0; b < out.size(); ++b) out[b] = b % 4 == static_cast<std::size_t>(view) % 4;
   return out;
 }
 

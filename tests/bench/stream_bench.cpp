@@ -16,7 +16,7 @@
 #include "pipeline/import/import.h"
 #include "pipeline/io/file_resolver.h"
 #include "stages/condition/condition.h"
-#include "stages/scales/scale_codecs.h"
+#include "stages/gltf/scale_codecs.h"
 #include "stages/scales/vertex_split.h"
 #include "stages/simplification/simplification.h"
 #include "stages/ssf/ssf.h"

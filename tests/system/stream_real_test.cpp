@@ -12,7 +12,7 @@
 #include "format/split/split_writer.h"
 #include "pipeline/import/import.h"
 #include "pipeline/io/file_resolver.h"
-#include "stages/scales/scale_codecs.h"
+#include "stages/gltf/scale_codecs.h"
 #include "stages/scales/vertex_split.h"
 #include "tests/format/split/split_fixture.h"
 #include "tests/stages/simplification/simplification_checks.h"
