@@ -51,7 +51,7 @@ void note_none(Notes& notes, int bytes, const std::string& why) {
 constexpr const char* kScaleWins = "a scale with the source's atlas looks better for the same bytes";
 constexpr const char* kWholeTakesFewer = "the whole object takes fewer";
 constexpr const char* kDoNotFit = "mesh and pictures do not fit";
-constexpr const char* kLittleBetter = "a scale of so many looks little better than the proxy before it";
+constexpr const char* kLittleBetter = "it would look little better than the proxy before it";
 constexpr const char* kOfSource = "proxies take at most 35 % of the source";
 constexpr const char* kSmallSource = "the smallest proxy would take more than 15 % of the source";
 
@@ -135,8 +135,9 @@ struct Learned {
 struct Candidate {
   std::optional<MadeProxy> made;
   ProxyForm form;
-  FlipSum flip;           // at the middle height
-  bool is_scale = false;  // not baked
+  FlipSum flip;                   // at the middle height
+  bool is_scale = false;          // not baked
+  bool has_beaten_scale = false;  // or is one: no plan of the bytes is nearer
   std::optional<FlipSum> large;
 };
 
@@ -153,7 +154,8 @@ void compete(const ProxySubject& subject, const ReferenceViews& views, BakedProx
   const double hopeless = best.made ? kFarBehind * best.flip.mean() / worth + kNoise : 1;
   const FlipSum flip =
       picture_loss(views, made->shown.scene(), made->shown.shown.textures, context, hopeless);
-  if (!best.made || flip.mean() * worth < best.flip.mean()) best = {std::move(made), form, flip, false, {}};
+  if (!best.made || flip.mean() * worth < best.flip.mean())
+    best = {std::move(made), form, flip, false, false, {}};
 }
 
 /// FLIP likes facets of a smooth object even where they are large (a bust's .107 for .115 at 20 kB); who
@@ -261,7 +263,7 @@ Candidate ProxySizes::best_candidate(int bytes) {
   Candidate scale;
   if (bytes >= kScaleFrom && !first) scale.made = scales_.of(static_cast<std::uint64_t>(bytes), context_);
   if (scale.made) {
-    scale.is_scale = true;
+    scale.is_scale = scale.has_beaten_scale = true;
     scale.flip = flip_of(*scale.made, middle_);
     const double share = learned_.last_bytes / bytes;
     if (learned_.last_flip * portable::pow(share, kMostPower) > scale.flip.mean()) return scale;
@@ -272,6 +274,7 @@ Candidate ProxySizes::best_candidate(int bytes) {
   if (!baked.made) return scale;
   learned_.last_bytes = (first ? kFirstShare : 1) * bytes, learned_.last_flip = baked.flip.mean();
   if (!scale.made) return baked;
+  baked.has_beaten_scale = true;
   scale.large = flip_of(*scale.made, large_), baked.large = flip_of(*baked.made, large_);
   return scale.large->mean() < baked.large->mean() ? std::move(scale) : std::move(baked);
 }
@@ -286,7 +289,8 @@ const char* ProxySizes::why_not(const Candidate& best, const FlipSum& large) {
     return kWholeTakesFewer;
   }
   if (!scales_compete()) return nullptr;
-  if (best.is_scale) return large.mean() > kWorthIts * kept_.back().large.mean() ? kLittleBetter : nullptr;
+  if (best.has_beaten_scale)
+    return large.mean() > kWorthIts * kept_.back().large.mean() ? kLittleBetter : nullptr;
   const auto rival_bytes = static_cast<std::uint64_t>((first ? kFirstShare : 1) * size);
   const bool loses = competitors_.win(rival_bytes, best.flip.mean(), learned_.prices, context_);
   if (first) learned_.smallest_loses = loses;

@@ -53,9 +53,10 @@ struct ProxiesOptions {
 ///   it stays where a larger one does, which clients cannot show at once. Where it wins, larger ones are
 ///   compared with what plans pay for scales: tables, the coarsest mesh, texels as their coding leaves them.
 ///   A small size is not tried where the likeliest scale is farther ahead of the last size than baked proxies
-///   come by their bytes. A scale is left out where it is less than a tenth nearer than the proxy before it.
-///   All proxies take at most 35 % of the source, of its images' files and of S_0's mesh, coded. A source of
-///   which the smallest size is more than 15 % gets none: it is loaded soon.
+///   come by their bytes. Where a file of a scale fits, the nearer of both stays, but where it is less than a
+///   tenth nearer than the proxy before it. All proxies take at most 35 % of the source, of its images' files
+///   and of S_0's mesh, coded. A source of which the smallest size is more than 15 % gets none: it is loaded
+///   soon.
 /// Sizes that get no proxy have a note that says why; no model fails because of its proxies. `pixels` are
 /// fill_planes()'s. Same bytes for any thread count and machine.
 Proxies make_proxies(const NestedScales& scales, const std::vector<Material>& materials,

@@ -27,7 +27,7 @@ constexpr double kOtherScale = 1.12;  // times the bytes: nearer ones are not lo
 constexpr int kMeshAttempts = 3;
 constexpr int kMostQualityOfImage = 97;
 constexpr double kAimedFull = 0.98, kNearlyFull = 0.96;  // of the bytes for images
-constexpr double kMissed = 0.06;                    // of a mesh' bytes
+constexpr double kMissed = 0.06;                         // of a mesh' bytes
 
 const char* use_name(TextureUse use) {
   switch (use) {

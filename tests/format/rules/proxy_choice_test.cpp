@@ -49,6 +49,9 @@ TEST(ProxyChoice, TheSmallestThatCannotBeToldServes) {
   EXPECT_EQ(serving_proxy(m, 200), 1u);
   EXPECT_EQ(serving_proxy(m, 512), std::nullopt);
   EXPECT_EQ(serving_proxy(Manifest{}, 64), std::nullopt);
+  Manifest large = m;  // scales come nearer than a larger file
+  for (ManifestProxy& p : large.proxies) p.glb.bytes += kMostServingBytes;
+  EXPECT_EQ(serving_proxy(large, 64), std::nullopt);
   Manifest by_p95 = m;  // the mean alone is not enough
   for (ManifestProxy& p : by_p95.proxies) p.flip_p95 = {0.16, 0.5};
   EXPECT_EQ(serving_proxy(by_p95, 64), std::nullopt);
