@@ -22,6 +22,7 @@ double loss_at(const std::vector<double>& sizes, const std::vector<double>& loss
 constexpr int kMoments = 64;            // at which the time left is looked at
 constexpr double kMeshTimeShare = 0.5;  // of the time left
 constexpr double kPaying = 0.95;        // of the mean without a step
+constexpr double kMostStepTime = 0.2;   // of the time left: what comes later takes too much from the end
 
 std::uint64_t beyond_first_request(std::uint64_t begin, std::uint64_t bytes) {
   const std::uint64_t end = begin + bytes;
@@ -136,7 +137,7 @@ std::optional<std::size_t> proxy_step(const Manifest& m, int wanted, double disp
   double least = kPaying * model.mean(0);
   std::optional<std::size_t> best;
   for (std::size_t k = 1; k < m.proxies.size(); ++k) {
-    if (!(model.flip(k) < model.flip(0)) || model.arrival_s(k) >= link.left_s) continue;
+    if (!(model.flip(k) < model.flip(0)) || model.arrival_s(k) >= kMostStepTime * link.left_s) continue;
     const double mean = model.mean(k);
     if (mean > least || (best && mean == least)) continue;
     least = mean;

@@ -112,6 +112,7 @@ export const mostServingBytes = 65536;
 export const moments = 64; // at which the time left is looked at
 export const meshTimeShare = 0.5; // of the time left
 export const paying = 0.95; // of the mean without a step
+export const mostStepTime = 0.2; // of the time left: what comes later takes too much from the end
 /** A coarser scale that is enough at any size stops just below, because the last step is always S_0's. */
 export const belowAny = 999000000;
 /** Keeps steps apart in the manifest's six digits. */
