@@ -122,6 +122,7 @@ ProxySubject subject_of(const Mesh& mesh, const ShownMaterials& shown, const Mat
 struct Learned {
   ProxyCosts costs;
   bool flat = false;                // the last proxy needs no normals
+  bool map_lost = false;  // a normal map plainly, at the last size that has tried one
   int picture_quality = 0;          // of the last proxy, 0 = not known
   double last_bytes = 0;            // of the last size that was baked, in bytes of Draco
   double last_flip = 0;             // its loss
@@ -181,10 +182,11 @@ Candidate best_of(const ProxySubject& subject, const ReferenceViews& views, Coar
   const auto try_form = [&](BakedProxy& baked) {
     compete(subject, views, baked, static_cast<std::uint64_t>(bytes), form, best, context);
   };
-  form.maps.normal = subject.mapped && bytes >= kNormalMapPaysFrom;
+  form.maps.normal = subject.mapped && bytes >= kNormalMapPaysFrom && !learned.map_lost;
   auto baked = bake();
   if (!baked) return best;
-  if (form.maps.normal) try_form(*baked);
+  double with_map = 0;
+  if (form.maps.normal) try_form(*baked), with_map = best.flip.mean();
   form.maps.normal = false;
   try_form(*baked);
   form.normals = false;
@@ -192,7 +194,9 @@ Candidate best_of(const ProxySubject& subject, const ReferenceViews& views, Coar
   if (best.made)
     if (const auto bits = texel_bits_of(*best.made)) learned.costs.texel_bits = *bits;
   learned.flat = best.made && !best.form.normals;
+  constexpr double kClearly = 0.99;
   if (best.made) learned.picture_quality = best.made->quality;
+  if (with_map > 0 && best.flip.mean() < kClearly * with_map) learned.map_lost = true;
   if (first && learned.flat)
     if (auto again = bake()) try_form(*again);
   return best;
@@ -324,13 +328,20 @@ std::vector<Proxy> measured_proxies(const ProxySubject& subject, std::vector<Kep
                                     const RunContext& context) {
   std::vector<Proxy> out;
   for (KeptProxy& k : kept) out.push_back(std::move(k.made.proxy));
-  ReferenceViews small;
-  if (!kept.empty()) small = reference_views(subject.mesh, subject.shown, kSmallPx, context);
+  ReferenceViews small, huge;
+  if (!kept.empty()) {
+    small = reference_views(subject.mesh, subject.shown, kSmallPx, context);
+    huge = reference_views(subject.mesh, subject.shown, kHugePx, context, true);
+  }
   for (std::size_t i = 0; i < kept.size(); ++i) {
     const ShownModel& shown = kept[i].made.shown;
-    const FlipSum at_small = picture_loss(small, shown.scene(), shown.shown.textures, context);
-    const std::array<std::pair<double, FlipSum>, 3> sums{
-        {{kSmallPx, at_small}, {kMiddlePx, kept[i].middle}, {kLargePx, kept[i].large}}};
+    const auto flip_in = [&](const ReferenceViews& views) {
+      return picture_loss(views, shown.scene(), shown.shown.textures, context);
+    };
+    const std::array<std::pair<double, FlipSum>, 4> sums{{{kSmallPx, flip_in(small)},
+                                                          {kMiddlePx, kept[i].middle},
+                                                          {kLargePx, kept[i].large},
+                                                          {kHugePx, flip_in(huge)}}};
     for (const auto& [px, flip] : sums) out[i].losses.push_back({px, flip.mean(), flip.percentile(0.95)});
   }
   return out;

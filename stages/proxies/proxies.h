@@ -46,8 +46,9 @@ struct ProxiesOptions {
 ///   EXT_meshopt_compression, KHR_mesh_quantization and KHR_texture_transform, larger ones by
 ///   KHR_draco_mesh_compression. A file is at most 2 % larger than its size asks for. So the default's
 ///   smallest one lies with a manifest of 8 kB in the 45,056 bytes of a client's first request.
-/// - Losses: FLIP of lit pictures beside S_0's (stages/render in the studio's light) at three displayed
-///   heights, where the height is that of the bounding box's longest side; four views, at the largest two.
+/// - Losses: FLIP of lit pictures beside S_0's (stages/render in the studio's light) at four displayed
+///   heights, where the height is that of the bounding box's longest side; four views, at 512 px two, at
+///   1,024 px a quarter of the rows of one.
 /// - Automatic choice, each size by itself: a baked one is left out where plans show something better for the
 ///   bytes. The smallest one is compared with scales of 55 % of its bytes, in which Draco codes as much, and
 ///   it stays where a larger one does, which clients cannot show at once. Where it wins, larger ones are

@@ -92,7 +92,8 @@ ReferenceViews reference_views(const Mesh& mesh, const ShownMaterials& shown, do
   const double extent = to_double(bounding_box(mesh.positions)).longest_side();
   const BoundingSphere sphere = bounding_sphere(mesh.positions);
   const RenderScene scene = render_scene(mesh, shown.materials, shown.textures.size());
-  for (int v = 0; v < kViews; v += displayed_px == kLargePx ? kLargeStep : 1) {
+  const int step = displayed_px > kLargePx ? kViews : displayed_px == kLargePx ? kLargeStep : 1;
+  for (int v = 0; v < kViews; v += step) {
     context.check_cancelled();
     ReferenceViews::View view;
     view.camera = perspective_camera(camera_of(v, kViews, sphere.centre, sphere.radius));
