@@ -45,8 +45,8 @@ struct StepLink {
 std::uint64_t document_bytes(const Manifest& manifest);
 
 /// The proxy that comes in the first fifth of the time left and lowers the mean FLIP of what is seen in it by
-/// at least a twentieth, of several the one that lowers it most; nothing where none does. `wanted`: the finest scale that is worth showing.
-/// What scales look like is supposed, see SPEC.md.
+/// at least a twentieth, of several the one that lowers it most; nothing where none does. `wanted`: the
+/// finest scale that is worth showing. What scales look like is supposed, see SPEC.md.
 std::optional<std::size_t> proxy_step(const Manifest& manifest, int wanted, double displayed_px,
                                       const StepLink& link);
 

@@ -122,7 +122,7 @@ ProxySubject subject_of(const Mesh& mesh, const ShownMaterials& shown, const Mat
 struct Learned {
   ProxyCosts costs;
   bool flat = false;                // the last proxy needs no normals
-  bool map_lost = false;  // a normal map plainly, at the last size that has tried one
+  bool map_lost = false;            // a normal map plainly, at the last size that has tried one
   int picture_quality = 0;          // of the last proxy, 0 = not known
   double last_bytes = 0;            // of the last size that was baked, in bytes of Draco
   double last_flip = 0;             // its loss

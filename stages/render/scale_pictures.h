@@ -18,8 +18,8 @@ std::uint32_t enough_side_px(const std::vector<Material>& materials);
 /// Displayed heights of the longest side of the bounding box.
 inline constexpr double kSmallPx = 128, kMiddlePx = 256, kLargePx = 512, kHugePx = 1024;
 
-/// Pictures of S_0 at one displayed height, from four sides; at kLargePx from two, above from one. Constant once
-/// made.
+/// Pictures of S_0 at one displayed height, from four sides; at kLargePx from two, above from one. Constant
+/// once made.
 struct ReferenceViews {
   struct View {
     RenderCamera camera;
