@@ -1,5 +1,7 @@
 #pragma once
 // Inside the room only: the source's images, smaller and coded anew, and what that costs in pictures.
+#include <optional>
+
 #include "stages/render/scale_pictures.h"
 
 namespace texmesh {
