@@ -1,4 +1,4 @@
-// Debian's chromium, headless, drawing with SwiftShader (`run` finds it); and the folders that `run` has made ready.
+// Debian's chromium, headless, drawing with SwiftShader; and the folders that `run` has made ready.
 import {execFileSync, spawn} from 'node:child_process';
 import fs from 'node:fs';
 import {createRequire} from 'node:module';
@@ -32,7 +32,7 @@ export const labRoots = {
 export const viewerRoots = {'/some/where/packages/': packages, '/some/where/': env.viewer};
 
 export const launch = () => chromium.launch({
-  executablePath: process.env.TEXMESH_CHROMIUM, timeout: 60000,
+  executablePath: process.env.TEXMESH_CHROMIUM ?? '/usr/bin/chromium', timeout: 60000,
   args: ['--headless=new', '--no-sandbox', '--disable-quic', '--no-first-run', '--disable-background-networking', '--disable-component-update',
     '--disable-sync', '--host-resolver-rules=MAP plain.test 127.0.0.1', '--use-gl=angle', '--use-angle=swiftshader', '--enable-unsafe-swiftshader', '--ignore-gpu-blocklist',
     '--enable-precise-memory-info', '--js-flags=--expose-gc', '--disable-dev-shm-usage'],
