@@ -265,7 +265,10 @@ Candidate ProxySizes::best_candidate(int bytes) {
   constexpr double kMostPower = 0.63;
   const bool first = kept_.empty();
   Candidate scale;
-  if (bytes >= kScaleFrom && !first) scale.made = scales_.of(static_cast<std::uint64_t>(bytes), context_);
+  try {
+    if (bytes >= kScaleFrom && !first) scale.made = scales_.of(static_cast<std::uint64_t>(bytes), context_);
+  } catch (const StageError&) {  // what no grid holds, or Draco refuses, is baked
+  }
   if (scale.made) {
     scale.is_scale = scale.has_beaten_scale = true;
     scale.flip = flip_of(*scale.made, middle_);
