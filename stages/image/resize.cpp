@@ -260,4 +260,29 @@ Pixels reduced(const Pixels& from, std::uint32_t used_width, std::uint32_t used_
   return out;
 }
 
+Pixels joined_alpha(const Pixels& colours, const Pixels& alpha) {
+  Pixels out{colours.width_px, colours.height_px, 4, {}};
+  out.data.reserve(4 * alpha.data.size());
+  for (std::size_t i = 0; i < alpha.data.size(); ++i) {
+    const std::uint8_t* c = colours.data.data() + i * colours.channels;
+    for (std::uint32_t k = 0; k < 3; ++k) out.data.push_back(c[colours.channels == 1 ? 0 : k]);
+    out.data.push_back(alpha.data[i]);
+  }
+  return out;
+}
+
+Pixels reduced_with_alpha(const Pixels& from, std::uint32_t width, std::uint32_t height, Averaging kind) {
+  const auto to_size = [&](const Pixels& p, Averaging how) {
+    return reduced(p, p.width_px, p.height_px, width, height, how);
+  };
+  if (from.channels % 2 == 1) return to_size(from, kind);
+  Pixels colours{from.width_px, from.height_px, 3, {}}, alpha{from.width_px, from.height_px, 1, {}};
+  colours.data.reserve(3 * from.data.size() / from.channels);
+  for (std::size_t i = 0; i < from.data.size(); i += from.channels) {
+    for (std::size_t k = 0; k < 3; ++k) colours.data.push_back(from.data[i + (from.channels == 4 ? k : 0)]);
+    alpha.data.push_back(from.data[i + from.channels - 1]);
+  }
+  return joined_alpha(to_size(colours, kind), to_size(alpha, Averaging::kNumbers));
+}
+
 }  // namespace texmesh

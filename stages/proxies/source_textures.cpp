@@ -30,36 +30,6 @@ const TextureRef& reference_of(const Material& m, TextureUse use) {
   return m.emissive_texture;
 }
 
-/// Colours and alpha of two channels or four.
-std::array<Pixels, 2> split_alpha(const Pixels& from) {
-  std::array<Pixels, 2> out{Pixels{from.width_px, from.height_px, 3, {}},
-                            Pixels{from.width_px, from.height_px, 1, {}}};
-  out[0].data.reserve(3 * from.data.size() / from.channels);
-  for (std::size_t i = 0; i < from.data.size(); i += from.channels) {
-    for (std::size_t k = 0; k < 3; ++k) out[0].data.push_back(from.data[i + (from.channels == 4 ? k : 0)]);
-    out[1].data.push_back(from.data[i + from.channels - 1]);
-  }
-  return out;
-}
-
-Pixels joined_alpha(const Pixels& colours, const Pixels& alpha) {
-  Pixels out{colours.width_px, colours.height_px, 4, {}};
-  for (std::size_t i = 0; i < alpha.data.size(); ++i) {
-    const std::uint8_t* c = colours.data.data() + 3 * i;
-    out.data.insert(out.data.end(), {c[0], c[1], c[2], alpha.data[i]});
-  }
-  return out;
-}
-
-Pixels smaller(const Pixels& from, Vec2<std::uint32_t> side, Averaging kind) {
-  const auto to_side = [&](const Pixels& p, Averaging how) {
-    return reduced(p, p.width_px, p.height_px, side.x, side.y, how);
-  };
-  if (from.channels % 2 == 1) return to_side(from, kind);
-  const std::array<Pixels, 2> parts = split_alpha(from);
-  return joined_alpha(to_side(parts[0], kind), to_side(parts[1], Averaging::kNumbers));
-}
-
 double squared(double flip) { return flip * flip; }
 
 /// Plans that no mix of two others beats, by rising bytes.
@@ -159,7 +129,7 @@ const Pixels& SourceTextures::pixels(const Member& member, TextureUse use, int s
   const Averaging kind = is_srgb(use)                 ? Averaging::kLight
                          : use == TextureUse::kNormal ? Averaging::kNormals
                                                       : Averaging::kNumbers;
-  return at->second = smaller(levels[level], side, kind);
+  return at->second = reduced_with_alpha(levels[level], side.x, side.y, kind);
 }
 
 CodedTexture SourceTextures::coded(const Member& member, TextureUse use, int steps, int quality, bool quick) {

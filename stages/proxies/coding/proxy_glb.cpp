@@ -4,6 +4,7 @@
 
 #include "format/base/portable_math.h"
 #include "stages/gltf/glb_writer.h"
+#include "stages/image/resize.h"
 #include "stages/image/webp.h"
 #include "stages/render/shade.h"
 
@@ -171,15 +172,6 @@ Pixels plain_pixels(const std::vector<Vec3f>& values, std::uint32_t width_px, st
   Pixels out{width_px, height_px, 3, {}};
   for (const Vec3f v : values)
     for (int k = 0; k < 3; ++k) out.data.push_back(byte_of(is_signed ? v[k] * 0.5f + 0.5f : v[k]));
-  return out;
-}
-
-Pixels with_alpha(const Pixels& rgb, const std::vector<float>& alpha) {
-  Pixels out{rgb.width_px, rgb.height_px, 4, {}};
-  for (std::size_t i = 0; i < alpha.size(); ++i) {
-    out.data.insert(out.data.end(), {rgb.data[3 * i], rgb.data[3 * i + 1], rgb.data[3 * i + 2]});
-    out.data.push_back(byte_of(alpha[i]));
-  }
   return out;
 }
 
@@ -429,7 +421,11 @@ MapPixels map_pixels(const BakedMaps& maps, const MapChoice& choice) {
     for (std::size_t i = 0; i < base.size(); ++i)
       base[i] = base[i] * (1 - kOcclusionInColour * (1 - maps.occlusion_roughness_metallic[i].x));
   out.base_colour = srgb_pixels(base, w, h);
-  if (maps.has_alpha) out.base_colour = with_alpha(out.base_colour, maps.alpha);
+  if (maps.has_alpha) {
+    Pixels alpha{w, h, 1, {}};
+    for (const float a : maps.alpha) alpha.data.push_back(byte_of(a));
+    out.base_colour = joined_alpha(out.base_colour, alpha);
+  }
   out.roughness = maps.mean_orm.y, out.metallic = maps.mean_orm.z;
   if (out.choice.orm) out.orm = plain_pixels(maps.occlusion_roughness_metallic, w, h, false);
   if (choice.normal) out.normal = plain_pixels(maps.normal, w, h, true);

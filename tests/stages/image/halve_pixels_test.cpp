@@ -126,4 +126,17 @@ TEST(HalvePixels, WhatIsNotThereIsRefused) {
   EXPECT_THROW(halved(shorter, 8, 8, Averaging::kLight), StageError);
 }
 
+TEST(HalvePixels, AlphaCountsApartAndAsNumbers) {
+  const Pixels from = noise(9, 6, 4), out = reduced_with_alpha(from, 5, 3, Averaging::kLight);
+  Pixels colours{9, 6, 3, {}}, alpha{9, 6, 1, {}};
+  for (std::size_t i = 0; i < from.data.size(); ++i)
+    (i % 4 < 3 ? colours : alpha).data.push_back(from.data[i]);
+  EXPECT_EQ(out.channels, 4u);
+  EXPECT_EQ(out.data, joined_alpha(reduced(colours, 9, 6, 5, 3, Averaging::kLight),
+                                   reduced(alpha, 9, 6, 5, 3, Averaging::kNumbers))
+                          .data);
+  const Pixels grey = reduced_with_alpha({1, 1, 2, {7, 9}}, 1, 1, Averaging::kLight);
+  EXPECT_EQ(grey.data, (std::vector<std::uint8_t>{7, 7, 7, 9}));
+}
+
 }  // namespace texmesh::halve_pixels_test

@@ -221,14 +221,7 @@ JoinedJpeg joined_plane(PackageReader& package, std::uint32_t plane, std::size_t
 Pixels with_alpha(const Pixels& colours, const Pixels& alpha) {
   if (colours.width_px != alpha.width_px || colours.height_px != alpha.height_px || alpha.channels != 1)
     throw FormatError(kTexturesPath, "alpha", "a plane as large as its colours", "another");
-  Pixels out{colours.width_px, colours.height_px, 4, {}};
-  out.data.reserve(std::size_t{4} * colours.width_px * colours.height_px);
-  for (std::size_t i = 0; i < alpha.data.size(); ++i) {
-    const std::uint8_t* c = colours.data.data() + i * colours.channels;
-    for (std::uint32_t k = 0; k < 3; ++k) out.data.push_back(c[colours.channels == 1 ? 0 : k]);
-    out.data.push_back(alpha.data[i]);
-  }
-  return out;
+  return joined_alpha(colours, alpha);
 }
 
 Pixels with_alpha_of(const PackageImage& image, const Pixels& colours, const Pixels& alpha) {

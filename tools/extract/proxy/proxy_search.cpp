@@ -295,16 +295,7 @@ Pixels smaller_map(const ProxyMap& map, double share) {
   };
   const std::uint32_t width = side(from.width_px), height = side(from.height_px);
   if (width == from.width_px && height == from.height_px) return from;
-  const auto resized = [&](const Pixels& pixels, Averaging kind) {
-    return reduced(pixels, from.width_px, from.height_px, width, height, kind);
-  };
-  if (from.channels != 4) return resized(from, map.averaging());
-  Pixels colours{from.width_px, from.height_px, 3, {}}, alpha{from.width_px, from.height_px, 1, {}};
-  for (std::size_t i = 0; i < from.data.size(); i += 4) {
-    colours.data.insert(colours.data.end(), {from.data[i], from.data[i + 1], from.data[i + 2]});
-    alpha.data.push_back(from.data[i + 3]);
-  }
-  return with_alpha(resized(colours, map.averaging()), resized(alpha, Averaging::kNumbers));
+  return reduced_with_alpha(from, width, height, map.averaging());
 }
 
 namespace {
