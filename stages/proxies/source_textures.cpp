@@ -2,6 +2,7 @@
 
 #include "format/base/portable_math.h"
 #include "format/documents/manifest.h"
+#include "stages/base/loss_curve.h"
 #include "stages/image/resize.h"
 #include "stages/image/webp.h"
 #include "stages/jpeg/jpeg.h"
@@ -31,21 +32,6 @@ const TextureRef& reference_of(const Material& m, TextureUse use) {
 }
 
 double squared(double flip) { return flip * flip; }
-
-/// Plans that no mix of two others beats, by rising bytes.
-std::vector<TexturePlan> convex(std::vector<TexturePlan> plans) {
-  std::ranges::sort(plans, {}, [](const TexturePlan& p) { return std::pair(p.bytes, p.loss); });
-  std::vector<TexturePlan> out;
-  const auto slope = [](const TexturePlan& a, const TexturePlan& b) {
-    return (a.loss - b.loss) / std::max(b.bytes - a.bytes, 1.0);
-  };
-  for (const TexturePlan& p : plans) {
-    if (!out.empty() && p.loss >= out.back().loss) continue;
-    while (out.size() > 1 && slope(out.back(), p) >= slope(out[out.size() - 2], out.back())) out.pop_back();
-    out.push_back(p);
-  }
-  return out;
-}
 
 }  // namespace
 
@@ -247,7 +233,7 @@ TextureCurves::TextureCurves(const Mesh& mesh, SourceTextures& textures, const R
     context.check_cancelled();
     std::vector<TexturePlan> plans = plans_of(textures, group, most_bytes);
     pictures.look_at(group, plans);
-    curves_.push_back(convex(std::move(plans)));
+    curves_.push_back(convex_curve(std::move(plans)));
   }
 }
 
@@ -257,15 +243,9 @@ std::optional<TextureCurves::Dealt> TextureCurves::deal(double bytes) const {
   for (const auto& curve : curves_) all += curve.front().bytes;
   if (all > bytes) return std::nullopt;
   while (true) {
-    std::size_t best = curves_.size();
-    double most = 0;
-    for (std::size_t g = 0; g < curves_.size(); ++g) {
-      if (at[g] + 1 >= curves_[g].size()) continue;
-      const TexturePlan &now = curves_[g][at[g]], &next = curves_[g][at[g] + 1];
-      const double gain = (now.loss - next.loss) / (next.bytes - now.bytes);
-      if (all + next.bytes - now.bytes > bytes || gain <= most) continue;
-      most = gain, best = g;
-    }
+    const std::size_t best = best_step(curves_, at, [&](std::size_t g) {
+      return all + curves_[g][at[g] + 1].bytes - curves_[g][at[g]].bytes <= bytes ? 1.0 : 0.0;
+    });
     if (best == curves_.size()) break;
     all += curves_[best][at[best] + 1].bytes - curves_[best][at[best]].bytes;
     ++at[best];

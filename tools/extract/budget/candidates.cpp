@@ -2,6 +2,7 @@
 
 #include "delivery/cpp/decide/texture_loss.h"
 #include "format/base/portable_math.h"
+#include "stages/base/loss_curve.h"
 #include "stages/base/parallel.h"
 #include "stages/image/decode_image.h"
 
@@ -334,24 +335,6 @@ constexpr double kShownTexels = 5;   // per pixel: of more the picture shows mea
 constexpr double kSourceFile = 0.9;  // of the bytes that the package has of a source's coefficients
 constexpr double kFarAbove = 4;  // of an image's bytes: stored coefficients would have to lose most of theirs
 
-/// Files that lie on the lower convex border, by rising bytes.
-std::vector<CodedImage> convex(std::vector<CodedImage> files) {
-  std::stable_sort(files.begin(), files.end(), [](const CodedImage& a, const CodedImage& b) {
-    return a.bytes != b.bytes ? a.bytes < b.bytes : a.loss < b.loss;
-  });
-  std::vector<CodedImage> out;
-  for (const CodedImage& f : files) {
-    if (!out.empty() && f.loss >= out.back().loss) continue;
-    while (out.size() >= 2) {
-      const CodedImage &a = out[out.size() - 2], &b = out.back();
-      if ((b.loss - a.loss) * (f.bytes - a.bytes) < (f.loss - a.loss) * (b.bytes - a.bytes)) break;
-      out.pop_back();
-    }
-    out.push_back(f);
-  }
-  return out;
-}
-
 /// Part of the bytes for textures that images of a role are likely to get, before anything is measured.
 double weight_of(const PackageImage& image) {
   return image.colours ? 1.0 : image.role == "normal" ? 0.7 : 0.25;
@@ -624,7 +607,7 @@ std::vector<ImageTrial> LossCurves::trials_around(const DealtBytes& chosen, doub
 
 void LossCurves::find_curves() {
   curves_.clear();
-  for (const std::vector<CodedImage>& files : seen_) curves_.push_back(convex(files));
+  for (const std::vector<CodedImage>& files : seen_) curves_.push_back(convex_curve(files));
 }
 
 std::vector<double> LossCurves::group_losses(const DealtBytes& allocation) const {
@@ -672,14 +655,8 @@ DealtBytes LossCurves::allocate(double bytes, const std::vector<double>& group_w
     out.bytes += curve.front().bytes;
   }
   for (;;) {
-    double best = 0;
-    std::size_t next = curves_.size();
-    for (std::size_t i = 0; i < curves_.size(); ++i) {
-      if (at[i] + 1 >= curves_[i].size()) continue;
-      const CodedImage &a = curves_[i][at[i]], &b = curves_[i][at[i] + 1];
-      const double gain = (a.loss - b.loss) / (b.bytes - a.bytes) * group_weights[reference_.groups[i]];
-      if (gain > best) best = gain, next = i;
-    }
+    const std::size_t next =
+        best_step(curves_, at, [&](std::size_t i) { return group_weights[reference_.groups[i]]; });
     if (next == curves_.size()) return out;
     const CodedImage &a = curves_[next][at[next]], &b = curves_[next][at[next] + 1];
     out.last = next;
