@@ -1,7 +1,8 @@
 // A scale as a proxy. Its story:
 // 1. Pictures of S_0 at kLargePx, a quarter of the rows, tell what each image loses in several sizes and
 // qualities, with everything else at its best (TextureCurves), and what scales lose with whole images.
-// 2. What a mesh loses by its coding, and the bytes that this takes, are known from other scans (kCodings).
+// 2. What a mesh loses by its coding, and the bytes that this takes, are known from other scans
+// (kScaleFineness).
 // 3. Losses in the same pixels join about as the sum of their squares. So for every number of bytes the mesh
 // and the images are chosen by sums: what the mesh leaves is dealt out along the curves.
 // 4. The mesh is coded. Where it takes other bytes than was thought, the choice is made again.
@@ -10,19 +11,13 @@
 
 #include "format/base/portable_math.h"
 #include "stages/geometry/scale_frames.h"
+#include "stages/gltf/scale_fineness.h"
 #include "stages/gltf/scale_glb.h"
 
 namespace texmesh {
 namespace {
 
-/// Means of turtle, saxophone, helmet and bust at several scales; for pictures 512 px high.
-struct MeshCoding512 {
-  int position_bits, uv_bits, normal_bits;
-  double loss;   // square of FLIP, beside the finest
-  double bytes;  // of those of the usual coding
-};
-constexpr std::array<MeshCoding512, 4> kCodings{
-    {{10, 10, 7, 270e-6, 0.81}, {11, 11, 7, 150e-6, 0.88}, {12, 12, 8, 60e-6, 1}, {13, 13, 8, 35e-6, 1.1}}};
+constexpr std::size_t kCodings = 4;   // of kScaleFineness: no proxy has bytes for finer ones
 constexpr double kOtherScale = 1.12;  // times the bytes: nearer ones are not looked at
 constexpr int kMeshAttempts = 3;
 constexpr int kMostQualityOfImage = 97;
@@ -101,17 +96,17 @@ double WholeScales::loss_of(std::size_t scale, const RunContext& context) {
 
 double WholeScales::mesh_bytes(const MeshChoice& mesh) const {
   if (const auto known = file_bytes_.find(mesh); known != file_bytes_.end()) return known->second;
-  return document_bytes_ + of_estimate_ * kCodings[mesh.coding].bytes * estimates_[mesh.scale];
+  return document_bytes_ + of_estimate_ * kScaleFineness[mesh.coding].bytes * estimates_[mesh.scale];
 }
 
 std::optional<WholeScales::Choice> WholeScales::best_with(std::size_t scale, double bytes,
                                                           const RunContext& context) {
   std::optional<Choice> best;
-  for (std::size_t c = 0; c < kCodings.size(); ++c) {
+  for (std::size_t c = 0; c < kCodings; ++c) {
     const MeshChoice mesh{scale, c};
     auto textures = curves_->deal(bytes - mesh_bytes(mesh));
     if (!textures || !textures_.keep_to_gpu_estimate(steps_of(*textures))) continue;
-    const double loss = kCodings[c].loss + textures->loss;
+    const double loss = kScaleFineness[c].loss + textures->loss;
     if (!best || loss < best->loss) best = Choice{mesh, std::move(*textures), loss};
   }
   if (best) best->loss += loss_of(scale, context);
@@ -145,7 +140,7 @@ std::optional<WholeScales::Choice> WholeScales::choose(double bytes, const RunCo
 }
 
 ScaleCoding WholeScales::coding_of(const MeshChoice& mesh, const RunContext& context) const {
-  const MeshCoding512& how = kCodings[mesh.coding];
+  const ScaleFineness& how = kScaleFineness[mesh.coding];
   ScaleCoding out = make_coding(source_.scales.mesh, materials_, source_.images, ScalesOptions{});
   out.frames = scale_frames(source_.scales, mesh.scale, context);
   out.options.normal_bits = how.normal_bits;
@@ -162,7 +157,8 @@ void WholeScales::code_mesh_of(const MeshChoice& mesh, const RunContext& context
       write_scale(coding_of(mesh, context), source_.scales.scales[mesh.scale], materials_, {}).glb;
   at->second = static_cast<double>(glb.size());
   document_bytes_ = json_bytes(glb);
-  of_estimate_ = (at->second - document_bytes_) / (kCodings[mesh.coding].bytes * estimates_[mesh.scale]);
+  of_estimate_ =
+      (at->second - document_bytes_) / (kScaleFineness[mesh.coding].bytes * estimates_[mesh.scale]);
 }
 
 /// All images with qualities that are so much higher.

@@ -28,7 +28,7 @@ class WholeScales {
   std::optional<MadeProxy> of(std::uint64_t bytes, const RunContext& context);
 
  private:
-  /// A scale, and how finely it is coded, 0 .. the number of kCodings - 1.
+  /// A scale, and how finely it is coded, as an index of kScaleFineness.
   struct MeshChoice {
     std::size_t scale = 0, coding = 0;
     auto operator<=>(const MeshChoice&) const = default;

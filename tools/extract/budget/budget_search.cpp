@@ -31,7 +31,6 @@
 namespace texmesh {
 namespace {
 
-constexpr int kFirstCoding = 2;
 constexpr double kNothing = 1e9;
 constexpr double kFewestExtraBits = -3, kMostExtraBits = 9;
 constexpr int kMeshTries = 12;
@@ -47,14 +46,6 @@ constexpr double kWorthALook = 1.15;  // times the least joined loss that was se
 constexpr double kUsualBytes = 3.5, kLeastBytes = 1.5;          // of a coded triangle
 constexpr double kTableBytes = 3;                               // the same, before one is coded
 constexpr double kTexelsPerByte = 20, kFastTexelsPerByte = 10;  // more texels are never worth a byte
-
-/// Means of turtle, saxophone, helmet and bust at several scales.
-struct LikelyCoding {
-  double loss;   // joined, beside the finest
-  double bytes;  // of kFirstCoding's
-};
-constexpr LikelyCoding kLikelyCodings[kMeshCodings] = {{270e-6, 0.81}, {150e-6, 0.88}, {60e-6, 1},
-                                                       {35e-6, 1.1},   {15e-6, 1.23},  {0, 1.36}};
 
 double most_texels(const ExtractBudget& wishes, std::uint64_t bytes) {
   const double a_byte = wishes.fast() ? kFastTexelsPerByte : kTexelsPerByte;
@@ -72,7 +63,7 @@ std::size_t likely_scale(const Reference& reference, std::uint64_t bytes) {
 
 MeshKey first_mesh(const Reference& reference, std::uint64_t bytes) {
   const std::optional<int>& scale = reference.wishes.scale;
-  return {scale ? reference.package.scale_index(*scale) : likely_scale(reference, bytes), kFirstCoding};
+  return {scale ? reference.package.scale_index(*scale) : likely_scale(reference, bytes), kUsualFineness};
 }
 
 /// What the first mesh leaves.
@@ -254,7 +245,7 @@ double Search::scale_loss(std::size_t scale) const {
 double Search::likely_loss(const MeshKey& key) {
   constexpr double kFinerScalesTakeLess = 0.35;  // bytes of a triangle ~ triangles to the power of minus this
   const auto triangles = [&](std::size_t scale) { return static_cast<double>(scales()[scale].triangles); };
-  const LikelyCoding &of_known = kLikelyCodings[known_.coding], &of_key = kLikelyCodings[key.coding];
+  const ScaleFineness &of_known = kScaleFineness[known_.coding], &of_key = kScaleFineness[key.coding];
   const double lost = joined(geometry_.at(known_)) - of_known.loss, of_scale = scale_loss(known_.scale);
   const double scale_losses = of_scale > 0 && !known_.is_finest() ? std::max(lost / of_scale, 0.1) : 1;
   const double bytes = known_bytes_ / of_known.bytes * of_key.bytes *
@@ -354,7 +345,7 @@ double Search::least_loss(const MeshKey& key) const {
 
 /// What pictures would tell, FLIP.
 double Search::table_geometry(const MeshKey& key) const {
-  return std::sqrt(scale_loss(key.scale) + kLikelyCodings[key.coding].loss);
+  return std::sqrt(scale_loss(key.scale) + kScaleFineness[key.coding].loss);
 }
 
 /// What a file of this mesh is expected to lose.

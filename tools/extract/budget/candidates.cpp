@@ -14,14 +14,6 @@ constexpr std::uint32_t kMostWebpPx = 16383;  // of a side, of the format
 constexpr std::size_t kSmallTexels = 262144;  // of such an image the texels are kept
 constexpr std::size_t kMostScales = 3;        // decoded at a time: tens of megabytes each
 
-/// Bits per coordinate along the longest side of the object, of texture coordinates along the image, of
-/// normals and vertex colours; for pictures 512 px high.
-struct Coding {
-  int position, uv, normal, colour;
-};
-constexpr Coding kCodings[kMeshCodings] = {{10, 10, 7, 5}, {11, 11, 7, 6}, {12, 12, 8, 7},
-                                           {13, 13, 8, 8}, {14, 14, 9, 8}, {15, 14, 11, 8}};
-
 }  // namespace
 
 std::vector<int> levels_of(const Manifest& manifest, int finest) {
@@ -41,13 +33,14 @@ double screen_coverage_of(const Manifest& manifest, int scale) {
 }
 
 DracoSteps Candidates::steps_of(const MeshKey& key) const {
-  const Coding& c = kCodings[key.coding];
+  const ScaleFineness& c = kScaleFineness[key.coding];
   int finer = 0;  // a picture twice as high shows one bit more
   for (double px = 512 * 1.5; px < reference_.wishes.display_px && finer < 4; px *= 2) ++finer;
   const auto places = [&](int bits) {
     return portable::exp(portable::log(2) * (bits + finer + key.extra_bits));
   };
-  return {reference_.extent / places(c.position), 1 / places(c.uv), c.normal, c.colour, key.extra_bits != 0};
+  return {reference_.extent / places(c.position_bits), 1 / places(c.uv_bits), c.normal_bits, c.colour_bits,
+          key.extra_bits != 0};
 }
 
 Candidates::ScaleToCode& Candidates::scale_to_code(int scale) {

@@ -2,6 +2,7 @@
 #include <compare>
 #include <list>
 
+#include "stages/gltf/scale_fineness.h"
 #include "tools/extract/budget/texture_tiles.h"
 #include "tools/extract/glb/standalone_glb.h"
 
@@ -14,7 +15,7 @@ std::vector<int> levels_of(const Manifest& manifest, int finest);
 double screen_coverage_of(const Manifest& manifest, int scale);
 
 /// How many ways to code a mesh there are, from the leanest to the finest (of S_0: as it is stored).
-inline constexpr int kMeshCodings = 6;
+inline constexpr int kMeshCodings = static_cast<int>(kScaleFineness.size());
 
 /// A scale, as an index into the manifest's scales, and how finely it is coded, 0 .. kMeshCodings - 1; with
 /// `extra_bits` (any part of one) for its positions and texture coordinates, where bytes have to be filled.
