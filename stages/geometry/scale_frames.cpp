@@ -221,9 +221,12 @@ ScaleFrames scale_frames(const NestedScales& scales, std::size_t index, const Ru
 }
 
 Mesh lit_scale(const NestedScales& scales, std::size_t index, const RunContext& context) {
+  return lit_scale(scales, index, scale_frames(scales, index, context));
+}
+
+Mesh lit_scale(const NestedScales& scales, std::size_t index, const ScaleFrames& frames) {
   const NestedScale& scale = scales.scales.at(index);
   Mesh out = extract_scale(scales, scale);
-  const ScaleFrames frames = scale_frames(scales, index, context);
   for (std::size_t t = 0; t < scale.triangles.size(); ++t)
     for (std::size_t k = 0; k < 3; ++k) {
       const std::uint32_t from = scale.triangles[t][k], to = out.triangles[t][k];

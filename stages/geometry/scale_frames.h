@@ -41,7 +41,8 @@ struct ScaleFrames {
 /// 0.5 us per wedge of S_0 on one core, less for coarse scales.
 ScaleFrames scale_frames(const NestedScales& scales, std::size_t index, const RunContext& context);
 
-/// extract_scale() with these normals and tangents.
+/// extract_scale() with normals and tangents of scale_frames(), or with those.
+Mesh lit_scale(const NestedScales& scales, std::size_t index, const ScaleFrames& frames);
 Mesh lit_scale(const NestedScales& scales, std::size_t index, const RunContext& context);
 
 /// What stands for S_0 where small pictures are all that is asked for: the index of the finest scale of at

@@ -88,7 +88,7 @@ void WholeScales::measure(const RunContext& context) {
 double WholeScales::loss_of(std::size_t scale, const RunContext& context) {
   const auto [at, is_new] = scale_losses_.try_emplace(scale, 0.0);
   if (!is_new || scale <= source_.stand_in) return at->second;
-  const Mesh mesh = lit_scale(source_.scales, scale, context);
+  const Mesh mesh = lit_scale(source_.scales, scale, frames_of(scale, context));
   const RenderScene scene = render_scene(mesh, source_.shown.materials, source_.shown.textures.size());
   const double flip = picture_loss(*views_, scene, source_.shown.textures, context).mean();
   return at->second = flip * flip;
@@ -139,10 +139,16 @@ std::optional<WholeScales::Choice> WholeScales::choose(double bytes, const RunCo
   return best;
 }
 
-ScaleCoding WholeScales::coding_of(const MeshChoice& mesh, const RunContext& context) const {
+const ScaleFrames& WholeScales::frames_of(std::size_t scale, const RunContext& context) {
+  if (!frames_ || frames_->first != scale)
+    frames_.emplace(scale, scale_frames(source_.scales, scale, context));
+  return frames_->second;
+}
+
+ScaleCoding WholeScales::coding_of(const MeshChoice& mesh, const RunContext& context) {
   const ScaleFineness& how = kScaleFineness[mesh.coding];
   ScaleCoding out = make_coding(source_.scales.mesh, materials_, source_.images, ScalesOptions{});
-  out.frames = scale_frames(source_.scales, mesh.scale, context);
+  out.frames = frames_of(mesh.scale, context);
   out.options.normal_bits = how.normal_bits;
   coarsen_positions(out.position, cells_of(how.position_bits), out.mesh,
                     source_.scales.scales[mesh.scale].triangles);
@@ -178,13 +184,14 @@ WholeScales::CodedImages WholeScales::coded_images(const TextureCurves::Dealt& d
   return out;
 }
 
-/// How much higher qualities may be than was dealt where images of one scan fill so many bytes.
-int WholeScales::higher_for(const TextureCurves::Dealt& dealt, double bytes) {
+/// How much higher qualities may be than was dealt where images of one scan, which take one_scan(higher),
+/// fill so many bytes.
+int WholeScales::higher_for(const std::function<double(int)>& one_scan, double bytes) {
   constexpr double kQualitiesOfE = 30;  // so many above it take e times the bytes
   constexpr int kQualityTries = 5;
   int low = -kMostQualityOfImage, high = kMostQualityOfImage, higher = 0, best = low;
   for (int i = 0; i < kQualityTries && low <= high; ++i) {
-    const double fill = coded_images(dealt, higher, true).bytes / std::max(bytes, 1.0);
+    const double fill = one_scan(higher) / std::max(bytes, 1.0);
     (fill <= 1 ? low : high) = fill <= 1 ? higher + 1 : higher - 1;
     if (fill <= 1) best = higher;
     if (fill <= 1 && fill >= kAimedFull) break;
@@ -199,12 +206,18 @@ int WholeScales::higher_for(const TextureCurves::Dealt& dealt, double bytes) {
 WholeScales::CodedImages WholeScales::filled(const TextureCurves::Dealt& dealt, double bytes) {
   constexpr int kFiles = 3;
   if (dealt.plans.empty()) return {};
+  std::map<int, double> known;
+  const auto one_scan = [&](int higher) {
+    const auto [at, is_new] = known.try_emplace(higher, 0.0);
+    if (is_new) at->second = coded_images(dealt, higher, true).bytes;
+    return at->second;
+  };
   std::optional<CodedImages> best;
   for (int i = 0; i < kFiles; ++i) {
-    const int higher = higher_for(dealt, bytes / scans_share_);
+    const int higher = higher_for(one_scan, bytes / scans_share_);
     CodedImages coded = coded_images(dealt, higher, false);
     const double fill = coded.bytes / std::max(bytes, 1.0);
-    scans_share_ = std::clamp(coded.bytes / coded_images(dealt, higher, true).bytes, 0.5, 1.2);
+    scans_share_ = std::clamp(coded.bytes / one_scan(higher), 0.5, 1.2);
     if (fill <= 1 && (!best || coded.bytes > best->bytes)) best = std::move(coded);
     if (best && (fill >= kNearlyFull || i > 0)) break;
   }
@@ -223,7 +236,7 @@ std::optional<MadeProxy> WholeScales::finished(const Choice& choice, std::uint64
   out.proxy.target_bytes = bytes;
   out.proxy.triangles = made.triangles, out.proxy.vertices = made.vertices;
   out.proxy.textures = std::move(images.rows);
-  out.shown.mesh = rounded_scale(lit_scale(source_.scales, choice.mesh.scale, context), coding);
+  out.shown.mesh = rounded_scale(lit_scale(source_.scales, choice.mesh.scale, coding.frames), coding);
   out.shown.shown.materials = source_.shown.materials;
   out.shown.shown.textures.resize(source_.shown.textures.size());
   std::size_t i = 0;

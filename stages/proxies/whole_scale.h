@@ -43,7 +43,8 @@ class WholeScales {
   double mesh_bytes(const MeshChoice& mesh) const;
   std::optional<Choice> best_with(std::size_t scale, double bytes, const RunContext& context);
   std::optional<Choice> choose(double bytes, const RunContext& context);
-  ScaleCoding coding_of(const MeshChoice& mesh, const RunContext& context) const;
+  const ScaleFrames& frames_of(std::size_t scale, const RunContext& context);
+  ScaleCoding coding_of(const MeshChoice& mesh, const RunContext& context);
   void code_mesh_of(const MeshChoice& mesh, const RunContext& context);
   struct CodedImages {
     GlbImages files;
@@ -51,7 +52,7 @@ class WholeScales {
     double bytes = 0;  // with what the document says of them
   };
   CodedImages coded_images(const TextureCurves::Dealt& dealt, int higher, bool quick);
-  int higher_for(const TextureCurves::Dealt& dealt, double bytes);
+  static int higher_for(const std::function<double(int)>& one_scan, double bytes);
   CodedImages filled(const TextureCurves::Dealt& dealt, double bytes);
   std::optional<MadeProxy> finished(const Choice& choice, std::uint64_t bytes, const RunContext& context);
 
@@ -63,11 +64,12 @@ class WholeScales {
   double scans_share_ = 0.95;  // of the bytes of one scan, what images of several take
   std::optional<ReferenceViews> views_;
   std::optional<TextureCurves> curves_;
-  std::map<std::size_t, double> scale_losses_;  // squares of FLIP, by scale
-  std::map<MeshChoice, double> file_bytes_;     // of files without images
-  std::vector<double> estimates_;               // of meshes' bytes, by scale
-  double of_estimate_ = 0.62;                   // what a mesh of the usual coding takes of them
-  double document_bytes_ = 1500;                // of a file without images, besides its mesh
+  std::map<std::size_t, double> scale_losses_;                 // squares of FLIP, by scale
+  std::optional<std::pair<std::size_t, ScaleFrames>> frames_;  // of the scale that was last asked for
+  std::map<MeshChoice, double> file_bytes_;                    // of files without images
+  std::vector<double> estimates_;                              // of meshes' bytes, by scale
+  double of_estimate_ = 0.62;     // what a mesh of the usual coding takes of them
+  double document_bytes_ = 1500;  // of a file without images, besides its mesh
 };
 
 }  // namespace texmesh
