@@ -132,13 +132,15 @@ struct Learned {
   bool holds_whole_object = false;  // the last proxy is all that larger ones could be
 };
 
+/// What a proxy is. No plan of its bytes is nearer than a scale's file, or than what has beaten that.
+enum class ProxyKind { kBaked, kBakedBeatsScale, kScale };
+
 /// A proxy of one size, in the form that looks best so far.
 struct Candidate {
   std::optional<MadeProxy> made;
   ProxyForm form;
-  FlipSum flip;                   // at the middle height
-  bool is_scale = false;          // not baked
-  bool has_beaten_scale = false;  // or is one: no plan of the bytes is nearer
+  FlipSum flip;  // at the middle height
+  ProxyKind kind = ProxyKind::kBaked;
   std::optional<FlipSum> large;
 };
 
@@ -156,7 +158,7 @@ void compete(const ProxySubject& subject, const ReferenceViews& views, BakedProx
   const FlipSum flip =
       picture_loss(views, made->shown.scene(), made->shown.shown.textures, context, hopeless);
   if (!best.made || flip.mean() * worth < best.flip.mean())
-    best = {std::move(made), form, flip, false, false, {}};
+    best = {std::move(made), form, flip, ProxyKind::kBaked, {}};
 }
 
 /// FLIP likes facets of a smooth object even where they are large (a bust's .107 for .115 at 20 kB); who
@@ -215,7 +217,7 @@ bool cannot_win(CompetingScales& scales, int bytes, const Learned& learned, cons
 struct KeptProxy {
   MadeProxy made;
   FlipSum middle, large;
-  bool is_scale = false;
+  ProxyKind kind;
 };
 
 /// Tries one size after the other, smallest first.
@@ -270,7 +272,7 @@ Candidate ProxySizes::best_candidate(int bytes) {
   } catch (const StageError&) {  // what no grid holds, or Draco refuses, is baked
   }
   if (scale.made) {
-    scale.is_scale = scale.has_beaten_scale = true;
+    scale.kind = ProxyKind::kScale;
     scale.flip = flip_of(*scale.made, middle_);
     const double share = learned_.last_bytes / bytes;
     if (learned_.last_flip * portable::pow(share, kMostPower) > scale.flip.mean()) return scale;
@@ -281,7 +283,7 @@ Candidate ProxySizes::best_candidate(int bytes) {
   if (!baked.made) return scale;
   learned_.last_bytes = (first ? kFirstShare : 1) * bytes, learned_.last_flip = baked.flip.mean();
   if (!scale.made) return baked;
-  baked.has_beaten_scale = true;
+  baked.kind = ProxyKind::kBakedBeatsScale;
   scale.large = flip_of(*scale.made, large_), baked.large = flip_of(*baked.made, large_);
   return scale.large->mean() < baked.large->mean() ? std::move(scale) : std::move(baked);
 }
@@ -292,11 +294,12 @@ const char* ProxySizes::why_not(const Candidate& best, const FlipSum& large) {
   const bool first = kept_.empty();
   const auto size = static_cast<double>(best.made->proxy.glb.size());
   if (!first && size <= static_cast<double>(kept_.back().made.proxy.glb.size())) {
-    learned_.holds_whole_object = kept_.back().is_scale == best.is_scale;
+    const auto is_scale = [](ProxyKind kind) { return kind == ProxyKind::kScale; };
+    learned_.holds_whole_object = is_scale(kept_.back().kind) == is_scale(best.kind);
     return kWholeTakesFewer;
   }
   if (!scales_compete()) return nullptr;
-  if (best.has_beaten_scale)
+  if (best.kind != ProxyKind::kBaked)
     return large.mean() > kWorthIts * kept_.back().large.mean() ? kLittleBetter : nullptr;
   const auto rival_bytes = static_cast<std::uint64_t>((first ? kFirstShare : 1) * size);
   const bool loses = competitors_.win(rival_bytes, best.flip.mean(), learned_.prices, context_);
@@ -314,7 +317,7 @@ const char* ProxySizes::add(int bytes) {
   FlipSum large = best.large ? std::move(*best.large) : flip_of(*best.made, large_);
   if (const char* why = why_not(best, large)) return why;
   learned_.all_bytes += static_cast<double>(best.made->proxy.glb.size());
-  kept_.push_back({std::move(*best.made), best.flip, std::move(large), best.is_scale});
+  kept_.push_back({std::move(*best.made), best.flip, std::move(large), best.kind});
   return nullptr;
 }
 
