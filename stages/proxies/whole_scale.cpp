@@ -189,16 +189,11 @@ WholeScales::CodedImages WholeScales::coded_images(const TextureCurves::Dealt& d
 int WholeScales::higher_for(const std::function<double(int)>& one_scan, double bytes) {
   constexpr double kQualitiesOfE = 30;  // so many above it take e times the bytes
   constexpr int kQualityTries = 5;
-  int low = -kMostQualityOfImage, high = kMostQualityOfImage, higher = 0, best = low;
-  for (int i = 0; i < kQualityTries && low <= high; ++i) {
-    const double fill = one_scan(higher) / std::max(bytes, 1.0);
-    (fill <= 1 ? low : high) = fill <= 1 ? higher + 1 : higher - 1;
-    if (fill <= 1) best = higher;
-    if (fill <= 1 && fill >= kAimedFull) break;
-    const double step = -kQualitiesOfE * portable::log(fill / ((1 + kAimedFull) / 2));
-    higher = std::clamp(higher + static_cast<int>(std::floor(step + 0.5)), low, std::max(low, high));
-  }
-  return best;
+  const double full = portable::log(kAimedFull), aim = portable::log((1 + kAimedFull) / 2);
+  const auto fill_of = [&](int higher) { return portable::log(one_scan(higher) / std::max(bytes, 1.0)); };
+  const auto nearer = [&](int higher, double fill) { return higher + kQualitiesOfE * (aim - fill); };
+  return fullest(-kMostQualityOfImage, kMostQualityOfImage, 0, kQualityTries, full, fill_of, nearer)
+      .value_or(-kMostQualityOfImage);
 }
 
 /// The images at qualities that fill so many bytes. Several scans take a share of the bytes of one, which the

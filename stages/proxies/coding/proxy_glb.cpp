@@ -441,36 +441,29 @@ MapPixels map_pixels(const BakedMaps& maps, const MapChoice& choice) {
 }
 
 ProxyPictures code_pictures(const MapPixels& maps, std::size_t max_bytes, CodedPictures& coded) {
-  constexpr int kFirstGuess = 60;
+  constexpr int kFirstGuess = 60, kTries = kMostQuality;
   // Finenesses for e times the bytes.
   constexpr double kFirstSlope = 0.3, kLeastSlope = 0.1, kMostSlope = 1;
-  std::optional<ProxyPictures> best;
   double slope = kFirstSlope, last_fill = 0;
   int last_quality = 0;
-  int quality = coded.last_quality > 0 ? coded.last_quality : kFirstGuess;
-  for (int low = kLeastQuality, high = kMostQuality; low <= high;) {
-    ProxyPictures tried = code_at(maps, quality, coded);
-    const double fill = portable::log(static_cast<double>(tried.bytes()) /
-                                      static_cast<double>(std::max<std::size_t>(max_bytes, 1)));
+  const auto fill_of = [&](int quality) {
+    return portable::log(static_cast<double>(code_at(maps, quality, coded).bytes()) /
+                         static_cast<double>(std::max<std::size_t>(max_bytes, 1)));
+  };
+  const auto nearer = [&](int quality, double fill) {
     const double fineness = fineness_of(quality);
     if (last_quality > 0 && fill != last_fill)
       slope =
           std::clamp((fineness - fineness_of(last_quality)) / (fill - last_fill), kLeastSlope, kMostSlope);
     last_quality = quality, last_fill = fill;
-    if (fill <= 0) {
-      best = std::move(tried);
-      if (fill >= kFull) break;
-      low = quality + 1;
-    } else {
-      high = quality - 1;
-    }
     // The aim is the middle of what is full enough.
-    const double next = quality_of(std::clamp(fineness + (kFull / 2 - fill) * slope, 0.0, 1.0));
-    if (low <= high) quality = std::clamp(static_cast<int>(std::floor(next + 0.5)), low, high);
-  }
-  if (!best) best = code_at(maps, kLeastQuality, coded);
-  coded.last_quality = best->quality;
-  return std::move(*best);
+    return quality_of(std::clamp(fineness + (kFull / 2 - fill) * slope, 0.0, 1.0));
+  };
+  coded.last_quality =
+      fullest(kLeastQuality, kMostQuality, coded.last_quality > 0 ? coded.last_quality : kFirstGuess, kTries,
+              kFull, fill_of, nearer)
+          .value_or(kLeastQuality);
+  return code_at(maps, coded.last_quality, coded);
 }
 
 std::size_t CodedMesh::bytes() const {

@@ -101,6 +101,22 @@ struct CodedPictures {
   int last_quality = 0;                             // 0 = none
 };
 
+/// The highest quality of those tried, from `first`, at which fill(quality), the logarithm of the bytes as
+/// parts of those that are asked for, is at most 0; nothing where none is. `nearer(quality, fill)` guesses
+/// the next one. Ends with one that is at least `full`.
+std::optional<int> fullest(int low, int high, int first, int tries, double full, const auto& fill,
+                           const auto& nearer) {
+  std::optional<int> best;
+  for (int at = first; tries > 0 && low <= high; --tries) {
+    const double found = fill(at);
+    if (found <= 0) best = at;
+    if (found <= 0 && found >= full) break;
+    (found <= 0 ? low : high) = found <= 0 ? at + 1 : at - 1;
+    at = std::clamp(static_cast<int>(std::floor(nearer(at, found) + 0.5)), low, std::max(low, high));
+  }
+  return best;
+}
+
 /// All pictures at the highest quality that fits max_bytes, or at one whose pictures take at least 97.5 % of
 /// them; at the lowest where none does.
 ProxyPictures code_pictures(const MapPixels& maps, std::size_t max_bytes, CodedPictures& coded);
