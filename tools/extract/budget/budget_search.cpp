@@ -16,7 +16,7 @@
 // texture that loses most, in few bytes other codings of it, a leaner mesh, other shares. One that is plainly
 // worse in a view is not looked at further. With --best many more files are looked at, in a small file those
 // of other likely meshes and codings, too. In a large file textures may be full: then the mesh is finer.
-// 7. Proxies of the package are tried in its place (offer_proxies()): in a small file before the other few,
+// 7. Proxies of the package are tried in its place (or_of_proxy()): in a small file before the other few,
 // which are not looked at where a proxy is plainly nearer.
 // Where the bytes hold S_0 and all of the source's own images, nothing is looked for (whole_source()).
 #include "tools/extract/budget/budget_search.h"
@@ -26,7 +26,6 @@
 #include "delivery/cpp/decide/texture_loss.h"
 #include "format/base/portable_math.h"
 #include "stages/base/parallel.h"
-#include "tools/extract/proxy/proxy_search.h"
 
 namespace texmesh {
 namespace {
@@ -134,7 +133,7 @@ struct SharedSearch {
   TextureSource textures;
   const Reference reference;
   Candidates candidates;
-  std::map<std::uint32_t, double> proxies;  // differences of those that were looked at
+  ProxyDifferences proxies;
 };
 
 }  // namespace
@@ -144,8 +143,13 @@ double CpuClock::since_last_s() {
   return static_cast<double>(last_ - before) / CLOCKS_PER_SEC;
 }
 
-Search::Search(const Reference& reference, Candidates& candidates, std::uint64_t bytes)
-    : reference_(reference), candidates_(candidates), bytes_(bytes), filling_(reference, candidates, bytes) {}
+Search::Search(const Reference& reference, Candidates& candidates, ProxyDifferences& proxies,
+               std::uint64_t bytes)
+    : reference_(reference),
+      candidates_(candidates),
+      proxies_(proxies),
+      bytes_(bytes),
+      filling_(reference, candidates, bytes) {}
 
 const LossCurves& Search::curves() {
   if (!curves_) curves_.emplace(reference_, candidates_, likely_texture_bytes(reference_, bytes_));
@@ -163,9 +167,7 @@ std::optional<Extracted> Search::source_file() {
   return out;
 }
 
-Extracted Search::run(const std::function<void(double)>& report,
-                      const std::function<void(Extracted&)>& offer) {
-  offer_ = offer;
+Extracted Search::run(const std::function<void(double)>& report) {
   curves();
   report(0.4);
   spent_.images_cpu_s = clock_.since_last_s();
@@ -183,7 +185,7 @@ Extracted Search::run(const std::function<void(double)>& report,
   Extracted out = finish(std::move(found));
   spent_.file_cpu_s += clock_.since_last_s();
   if (!offered_)
-    offer_(out);
+    out = or_of_proxy(reference_, bytes_, proxies_, std::move(out));
   else if (offered_->proxy && (!out.within || offered_->difference < out.difference))
     out = *std::move(offered_);
   spent_.proxies_cpu_s += clock_.since_last_s();
@@ -386,9 +388,9 @@ void Search::look_at_few_files(FoundFile& best) {
 /// Than any file of a scale that a few more looks may find.
 bool Search::proxy_is_plainly_nearer(const FoundFile& found) {
   if (!offered_) {
-    offered_ = finish(found);
+    Extracted file = finish(found);
     spent_.file_cpu_s += clock_.since_last_s();
-    offer_(*offered_);
+    offered_ = or_of_proxy(reference_, bytes_, proxies_, std::move(file));
     spent_.proxies_cpu_s += clock_.since_last_s();
   }
   return offered_->proxy && offered_->difference < kPlainlyNearer * found.difference;
@@ -424,7 +426,7 @@ bool Search::try_file(const MeshKey& key, const DealtBytes& images, FoundFile& b
   for (const CodedImage& image : images.images) tried.plans.push_back(image.plan);
   tried.plans[images.last].quality = 0;
   if (looks_left_ == 0 || std::ranges::find(tried_, tried) != tried_.end()) return false;
-  --looks_left_;
+  if (looks_left_) --*looks_left_;
   tried_.push_back(std::move(tried));
   return replace_if_nearer(file_of(key, images), best);
 }
@@ -618,7 +620,8 @@ std::optional<Extracted> whole_source(PackageReader& package, const ExtractBudge
   TextureSource textures(package, 0, context, tables.effort);
   const Reference reference(package, tables, place, textures, context, 0);
   Candidates candidates(reference, textures);
-  return Search(reference, candidates, bytes).source_file();
+  ProxyDifferences none;
+  return Search(reference, candidates, none, bytes).source_file();
 }
 
 }  // namespace
@@ -649,9 +652,7 @@ std::vector<Extracted> extract_within_bytes(PackageReader& package, const Extrac
     const double reference_cpu_s = clock.since_last_s();
     report(0.2);
     Extracted& found = out[order[i]];
-    found = Search(shared->reference, shared->candidates, wanted).run(report, [&](Extracted& file) {
-      offer_proxies(shared->reference, wanted, shared->proxies, file);
-    });
+    found = Search(shared->reference, shared->candidates, shared->proxies, wanted).run(report);
     found.spent.reference_cpu_s = reference_cpu_s;
     shared->candidates.forget_lit_meshes();
     clock.since_last_s();

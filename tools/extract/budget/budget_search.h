@@ -2,6 +2,7 @@
 #include <ctime>
 
 #include "tools/extract/budget/filling.h"
+#include "tools/extract/proxy/proxy_search.h"
 
 namespace texmesh {
 
@@ -9,7 +10,7 @@ namespace texmesh {
 /// best: scale, coding of the mesh, size and quality of every texture are chosen together, by lit pictures
 /// (stages/render, the studio's light), so that each map gets bytes for what it changes in them. Where a
 /// proxy of the package, made smaller where it must be, looks better in whole pictures, the file is of that
-/// proxy (offer_proxies()). What does not depend on the number of bytes is made once; every file is the one
+/// proxy (or_of_proxy()). What does not depend on the number of bytes is made once; every file is the one
 /// that its number alone gives. InputError for a scale that is not there. Same bytes for any number of
 /// threads.
 std::vector<Extracted> extract_within_bytes(PackageReader& package, const ExtractBudget& wishes,
@@ -37,9 +38,9 @@ struct FoundFile {
 /// The search for the file of one number of bytes: see the top of the .cpp.
 class Search {
  public:
-  Search(const Reference& reference, Candidates& candidates, std::uint64_t bytes);
-  /// `report`: parts of the way. `offer`: replaces a file by one of a proxy that looks nearer.
-  Extracted run(const std::function<void(double)>& report, const std::function<void(Extracted&)>& offer);
+  Search(const Reference& reference, Candidates& candidates, ProxyDifferences& proxies, std::uint64_t bytes);
+  /// `report`: parts of the way.
+  Extracted run(const std::function<void(double)>& report);
   /// S_0 and the source's own images; nothing where the bytes do not hold them.
   std::optional<Extracted> source_file();
 
@@ -103,6 +104,7 @@ class Search {
 
   const Reference& reference_;
   Candidates& candidates_;
+  ProxyDifferences& proxies_;
   const std::uint64_t bytes_;
   CpuClock clock_;
   ExtractSpent spent_;
@@ -116,10 +118,9 @@ class Search {
   double known_bytes_ = 0;
   bool only_likely_ = false;  // meshes that tables make hopeless are not looked at
   double least_ = 1e9;
-  std::function<void(Extracted&)> offer_;
   std::optional<Extracted> offered_;  // a file, or the proxy's that has replaced it
   std::vector<TriedFile> tried_;
-  int looks_left_ = 1000;  // at files other than the first
+  std::optional<int> looks_left_;  // at files other than the first; nothing = any number
 };
 
 }  // namespace texmesh

@@ -335,29 +335,20 @@ struct ProxyTrial {
 
 class ProxySearch {
  public:
-  /// `whole`: differences of proxies as they are, for those that are known.
-  ProxySearch(const Reference& reference, std::uint64_t bytes, std::map<std::uint32_t, double>& whole,
-              Extracted& found)
-      : reference_(reference), bytes_(bytes), whole_(whole), best_(found) {}
+  ProxySearch(const Reference& reference, std::uint64_t bytes, ProxyDifferences& whole, Extracted found)
+      : reference_(reference), bytes_(bytes), whole_(whole), best_(std::move(found)) {}
 
   /// Those that fit from the largest on, then the others from the smallest on. But with --best tables pass
   /// over those that are likely to look worse, and few are made smaller.
-  void run() {
+  Extracted nearest() && {
     const std::vector<ManifestProxy>& proxies = reference_.package.manifest().proxies;
     const auto fitting = static_cast<std::uint32_t>(
         std::ranges::count_if(proxies, [&](const ManifestProxy& p) { return p.glb.bytes <= bytes_; }));
     int made_smaller = 0;
-    bool hopeful = false;
     for (std::uint32_t i = 0; i < proxies.size(); ++i) {
       const std::uint32_t k = i < fitting ? fitting - 1 - i : i;
       const bool best = reference_.wishes.best();
-      if (!best && kFarBelow * proxies[k].glb.bytes < bytes_) continue;
-      hopeful = (k >= fitting && hopeful) || best || may_look_better(k);
-      if (!best && k >= fitting && k + 1 < proxies.size() &&
-          static_cast<double>(proxies[k + 1].triangles) <= kAlike * static_cast<double>(proxies[k].triangles))
-        continue;  // the next one has as good a mesh, and finer pictures
-      if (!std::exchange(hopeful, false) || (!best && made_smaller == (bytes_ < kFewBytesOfProxy ? 2 : 1)))
-        continue;
+      if (!best && (made_smaller == (bytes_ < kFewBytesOfProxy ? 2 : 1) || !is_worth_a_try(k))) continue;
       Extracted whole = extract_proxy(reference_.package, {k}, reference_.place, reference_.context, bytes_);
       const bool is_file = fits(whole) && is_wanted_kind(k);
       if (best || is_file)
@@ -371,6 +362,7 @@ class ProxySearch {
         ++made_smaller;
       }
     }
+    return std::move(best_);
   }
 
  private:
@@ -404,6 +396,21 @@ class ProxySearch {
     const double likely =
         table_flip(proxy) * (times > 1 ? portable::pow(times, kSmallerLoses) : 1 / kTableErrs);
     return !fits(best_) || likely < (times > 1 ? kWorthATry : 1) * best_.difference;
+  }
+
+  /// Of proxies that do not fit and have meshes as good, the largest, which has the finest pictures: where
+  /// any of them may look better.
+  bool is_worth_a_try(std::uint32_t proxy) const {
+    const std::vector<ManifestProxy>& proxies = reference_.package.manifest().proxies;
+    const auto gives_way = [&](std::uint32_t p) {
+      return proxies[p].glb.bytes > bytes_ && p + 1 < proxies.size() &&
+             static_cast<double>(proxies[p + 1].triangles) <=
+                 kAlike * static_cast<double>(proxies[p].triangles);
+    };
+    if (kFarBelow * proxies[proxy].glb.bytes < bytes_ || gives_way(proxy)) return false;
+    while (!may_look_better(proxy))
+      if (proxy == 0 || !gives_way(--proxy)) return false;
+    return true;
   }
 
   void measure_whole(std::uint32_t proxy, Extracted& file) {
@@ -636,8 +643,8 @@ class ProxySearch {
 
   const Reference& reference_;
   const std::uint64_t bytes_;
-  std::map<std::uint32_t, double>& whole_;
-  Extracted& best_;
+  ProxyDifferences& whole_;
+  Extracted best_;
   /// What pictures of so many texels take.
   struct Rate {
     double quality = 50, texels = 0, bytes = 1;
@@ -671,11 +678,11 @@ Extracted extract_proxy(PackageReader& package, const ExtractProxy& wishes, cons
   return out;
 }
 
-void offer_proxies(const Reference& reference, std::uint64_t bytes,
-                   std::map<std::uint32_t, double>& differences, Extracted& found) {
+Extracted or_of_proxy(const Reference& reference, std::uint64_t bytes, ProxyDifferences& differences,
+                      Extracted found) {
   const ExtractBudget& wishes = reference.wishes;
-  if (!wishes.scale && !wishes.levels && wishes.images != ExtractImages::kPng)
-    ProxySearch(reference, bytes, differences, found).run();
+  if (wishes.scale || wishes.levels || wishes.images == ExtractImages::kPng) return found;
+  return ProxySearch(reference, bytes, differences, std::move(found)).nearest();
 }
 
 }  // namespace texmesh

@@ -69,13 +69,15 @@ class ProxyParts {
 Extracted extract_proxy(PackageReader& package, const ExtractProxy& wishes, const OutputTransform& place,
                         const RunContext& context, std::uint64_t asked_bytes = 0);
 
-/// Replaces `found`, a file of a scale for so many bytes, by one of a proxy where that one's whole lit
-/// pictures are nearer to the package's best, or where only that one keeps within the bytes. A proxy of too
-/// many bytes gets fewer triangles, its mesh coded by Draco, its pictures smaller or coded anew, and maps
-/// left out, until it fills the bytes. `found` stays where a scale, levels of detail or PNG is asked for.
-/// `differences` keeps those of proxies as they are, for other numbers of bytes. Same bytes for any thread
-/// count.
-void offer_proxies(const Reference& reference, std::uint64_t bytes,
-                   std::map<std::uint32_t, double>& differences, Extracted& found);
+/// Of proxies as they are, those that were looked at: for searches for other numbers of bytes.
+using ProxyDifferences = std::map<std::uint32_t, double>;
+
+/// `found`, a file of a scale for so many bytes, or one of a proxy where that one's whole lit pictures are
+/// nearer to the package's best, or where only that one keeps within the bytes. A proxy of too many bytes
+/// gets fewer triangles, its mesh coded by Draco, its pictures smaller or coded anew, and maps left out,
+/// until it fills the bytes. `found` stays where a scale, levels of detail or PNG is asked for. Same bytes
+/// for any thread count.
+Extracted or_of_proxy(const Reference& reference, std::uint64_t bytes, ProxyDifferences& differences,
+                      Extracted found);
 
 }  // namespace texmesh

@@ -39,7 +39,8 @@ class Looks : public ::testing::Test {
   TextureSource textures_{package_, 40.0 * kBytes, {}};
   const Reference reference_{package_, small_request(), {}, textures_, {}};
   Candidates candidates_{reference_, textures_};
-  Search search_{reference_, candidates_, kBytes};
+  ProxyDifferences proxies_;
+  Search search_{reference_, candidates_, proxies_, kBytes};
 };
 
 TEST_F(Looks, ATextureThatIsMuchTooSmallGrows) {
