@@ -24,7 +24,7 @@ bool is_special_file(const std::string& path);
 /// what it leads to (atomically, and the link stays); else as write_file_atomically.
 void write_output_file(const std::string& path, ByteSpan bytes, const std::string& temporary = "");
 
-/// Throws InputError when write_output_file() could not write there, Error where this user may not: for
+/// Throws InputError when write_output_file() could not write there, RightsError where this user may not: for
 /// commands that work long before they do.
 void check_output_file(const std::string& path);
 

@@ -2,7 +2,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "format/base/errors.h"
+#include "pipeline/io/resolver.h"
 
 namespace texmesh {
 
@@ -11,11 +11,13 @@ struct UsageError : InputError {
   using InputError::InputError;
 };
 
-/// Runs what reads what was asked for: an InputError of it becomes a UsageError.
+/// Runs what reads what was asked for: an InputError of it becomes a UsageError, but for rights.
 template <class Run>
 auto as_usage(const Run& run) {
   try {
     return run();
+  } catch (const RightsError&) {
+    throw;
   } catch (const InputError& e) {
     throw UsageError(e.file(), e.place(), e.expected(), e.found());
   }
