@@ -305,12 +305,10 @@ ThresholdStudy study_thresholds(const std::vector<JudgeTable>& judges,
   study.by_judges = judges.size() >= kLeastJudgesToDraw;
   const Draw fitted = draw_of(all, displayed_px, study.law.reference_px);
   std::vector<Draw> drawn(static_cast<std::size_t>(draws));
-  parallel_for(context, drawn.size(), 8, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t k = begin; k < end; ++k) {
-      SplitMix random(SplitMix(SplitMix(seed).bits() + k).bits());  // no seed shares draws with the next
-      drawn[k] = draw_of(drawn_conditions(judges, all, study.by_judges, random), displayed_px,
-                         study.law.reference_px);
-    }
+  parallel_each(context, drawn.size(), 8, [&](std::size_t k) {
+    SplitMix random(SplitMix(SplitMix(seed).bits() + k).bits());  // no seed shares draws with the next
+    drawn[k] =
+        draw_of(drawn_conditions(judges, all, study.by_judges, random), displayed_px, study.law.reference_px);
   });
   study.within = true;
   for (std::size_t c = 0; c < all.size(); ++c) {

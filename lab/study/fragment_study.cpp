@@ -146,11 +146,9 @@ std::vector<FragmentStudyRow> study_grid(const Pixels& image, int grid, const st
   const Ladder ladder = encode_ladder(cut.fragments, cut.pixels, {}, {}, ladder_options, quiet);
   const std::size_t count = plane.fragment_count(), qualities = options.qualities.size();
   std::vector<FileSizes> files(count * qualities);
-  parallel_for(context, files.size(), 1, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t k = begin; k < end; ++k) {
-      const PixelWindow window = window_of(cut.pixels[0], padded_fragment_rectangle(plane, k % count));
-      files[k] = file_sizes(cut.pixels[0], window, options.qualities[k / count], options);
-    }
+  parallel_each(context, files.size(), 1, [&](std::size_t k) {
+    const PixelWindow window = window_of(cut.pixels[0], padded_fragment_rectangle(plane, k % count));
+    files[k] = file_sizes(cut.pixels[0], window, options.qualities[k / count], options);
   });
   std::vector<FragmentStudyRow> rows;
   for (std::size_t q = 0; q < qualities; ++q) {
@@ -180,10 +178,9 @@ std::vector<FragmentStudyRow> study_fragments(const Pixels& pixels, const Fragme
                                               const RunContext& context) {
   check(pixels, options);
   std::vector<FileSizes> whole(options.qualities.size());
-  parallel_for(context, whole.size(), 1, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t q = begin; q < end; ++q)
-      whole[q] = file_sizes(pixels, window_of(pixels, {0, 0, pixels.width_px, pixels.height_px}),
-                            options.qualities[q], options);
+  parallel_each(context, whole.size(), 1, [&](std::size_t q) {
+    whole[q] = file_sizes(pixels, window_of(pixels, {0, 0, pixels.width_px, pixels.height_px}),
+                          options.qualities[q], options);
   });
   std::vector<FragmentStudyRow> out;
   for (std::size_t g = 0; g < options.grids.size(); ++g) {

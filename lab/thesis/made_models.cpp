@@ -231,9 +231,7 @@ Pixels made_texture(std::uint32_t side_px, double contrast, std::uint32_t seed, 
             static_cast<std::uint8_t>(std::clamp(128 + 255 * contrast * (value + tint * hue), 0.0, 255.0));
     }
   };
-  parallel_for(context, side_px, 16, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t y = begin; y < end; ++y) draw_row(y);
-  });
+  parallel_each(context, side_px, 16, [&](std::size_t y) { draw_row(y); });
   return out;
 }
 

@@ -58,15 +58,13 @@ Level make_level(std::uint32_t inner_side, const RunContext& context, auto value
   Level level;
   level.side = inner_side + 2;
   level.texels.resize(static_cast<std::size_t>(level.side) * level.side);
-  parallel_for(context, level.texels.size(), 256, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t i = begin; i < end; ++i) {
-      auto place = [&](std::size_t at) {
-        return (static_cast<float>(at) - 0.5f) * 2 / static_cast<float>(inner_side) - 1;
-      };
-      const Vec3f value = value_of(octahedral_direction({place(i % level.side), place(i / level.side)}));
-      level.texels[i] =
-          padded({clamped(value.x, 0, 65504), clamped(value.y, 0, 65504), clamped(value.z, 0, 65504)});
-    }
+  parallel_each(context, level.texels.size(), 256, [&](std::size_t i) {
+    auto place = [&](std::size_t at) {
+      return (static_cast<float>(at) - 0.5f) * 2 / static_cast<float>(inner_side) - 1;
+    };
+    const Vec3f value = value_of(octahedral_direction({place(i % level.side), place(i / level.side)}));
+    level.texels[i] =
+        padded({clamped(value.x, 0, 65504), clamped(value.y, 0, 65504), clamped(value.z, 0, 65504)});
   });
   return level;
 }

@@ -253,9 +253,8 @@ class ComponentFilter {
       const std::vector<HeatFlow> flows =
           diffuse(state.level.laplacian, walker.points, walker.time, times, context_);
       curvature.resize(curvature.size() + flows.size());
-      parallel_for(context_, flows.size(), 1, [&](std::size_t from, std::size_t to) {
-        for (std::size_t f = from; f < to; ++f)
-          curvature[i - begin + f] = curvature_of(state, walker.points, flows[f]);
+      parallel_each(context_, flows.size(), 1, [&](std::size_t f) {
+        curvature[i - begin + f] = curvature_of(state, walker.points, flows[f]);
       });
       for (std::size_t s = i; s < std::min(stop, scales_) && s < end; ++s)
         if (has_converged(walker.points, flows[s - i], s)) converged = std::min(converged, s);

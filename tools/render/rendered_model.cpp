@@ -82,12 +82,10 @@ RenderedModel rendered_model(ImportedModel imported, const RunContext& context) 
   RenderedModel model = untextured_model(std::move(source.mesh), source.materials);
   model.notes.insert(model.notes.begin(), source.notes.begin(), source.notes.end());
   std::vector<Pixels> pixels(model.texture_images.size());
-  parallel_for(context, pixels.size(), 1, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t t = begin; t < end; ++t) {
-      const TextureImage& from = model.texture_images[t];
-      pixels[t] =
-          decode_image(source.images.at(from.image), from.srgb ? FloatEncoding::kSrgb : FloatEncoding::kAsIs);
-    }
+  parallel_each(context, pixels.size(), 1, [&](std::size_t t) {
+    const TextureImage& from = model.texture_images[t];
+    pixels[t] =
+        decode_image(source.images.at(from.image), from.srgb ? FloatEncoding::kSrgb : FloatEncoding::kAsIs);
   });
   for (std::size_t t = 0; t < pixels.size(); ++t)
     model.textures.push_back(render_texture(std::move(pixels[t]), model.texture_images[t].srgb, 0, context));
@@ -239,13 +237,11 @@ void require_size(const TextureInfo& info, std::uint32_t plane) {
 void decode_fragments(const TextureInfo& info, const std::string& rung_path, const PlaneStreams& streams,
                       std::span<const std::uint16_t> fragments, Pixels& plane, const RunContext& context) {
   const std::uint64_t fragment_pixels = std::uint64_t{info.fragment_width_px} * info.fragment_height_px;
-  parallel_for(context, fragments.size(), 1, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t k = begin; k < end; ++k) {
-      if (streams.stream(fragments[k]).empty()) continue;
-      const Pixels pixels = decode_fragment_file(info.codec, streams.file(fragments[k]), fragment_pixels);
-      require_fragment(pixels, info, rung_path, fragments[k]);
-      place(pixels, info, fragments[k], plane);
-    }
+  parallel_each(context, fragments.size(), 1, [&](std::size_t k) {
+    if (streams.stream(fragments[k]).empty()) return;
+    const Pixels pixels = decode_fragment_file(info.codec, streams.file(fragments[k]), fragment_pixels);
+    require_fragment(pixels, info, rung_path, fragments[k]);
+    place(pixels, info, fragments[k], plane);
   });
 }
 

@@ -522,11 +522,9 @@ void Search::look_at(FoundFile& found, const FoundFile* rival) {
   candidates_.prepare_views(found.key);
   const auto look = [&](const std::vector<std::size_t>& views) {
     const RunContext& context = views.size() == 1 ? reference_.context : one;
-    parallel_for(reference_.context, views.size(), 1, [&](std::size_t begin, std::size_t end) {
-      for (std::size_t k = begin; k < end; ++k) {
-        const auto [seen, at] = candidates_.view(found.key, views[k], context);
-        found.parts[views[k]] = meter.part(views[k], seen, at, textures, context);
-      }
+    parallel_each(reference_.context, views.size(), 1, [&](std::size_t k) {
+      const auto [seen, at] = candidates_.view(found.key, views[k], context);
+      found.parts[views[k]] = meter.part(views[k], seen, at, textures, context);
     });
   };
   const std::size_t first = meter.fullest();

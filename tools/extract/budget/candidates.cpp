@@ -300,12 +300,10 @@ void Candidates::measure_together(std::span<const ImageTrial> trials) {
   for (const ImageTrial& t : trials) tiles.push_back(tiles_for(t));
   RunContext serial = reference_.context;
   serial.threads = 1;
-  parallel_for(reference_.context, trials.size(), 1, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t k = begin; k < end; ++k) {
-      const ImageTrial& t = trials[k];
-      found[k].plan = {t.coding, size_step(t.step), t.quality};
-      textures[k] = trial_textures(t, tiles[k], serial, found[k].bytes);
-    }
+  parallel_each(reference_.context, trials.size(), 1, [&](std::size_t k) {
+    const ImageTrial& t = trials[k];
+    found[k].plan = {t.coding, size_step(t.step), t.quality};
+    textures[k] = trial_textures(t, tiles[k], serial, found[k].bytes);
   });
   const std::vector<double> losses = reference_.window_meter->differences(
       *reference_.finest_windows, reference_.best_textures, std::move(textures), reference_.context);

@@ -94,15 +94,13 @@ void Filling::replace_if_larger(FilledFile&& file, FilledFile& best) const {
 void Filling::encode(Draft& draft, const std::vector<std::size_t>& images) const {
   draft.files.resize(draft.plans.size());
   draft.coded.resize(draft.plans.size());
-  parallel_for(reference_.context, images.size(), 1, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t k = begin; k < end; ++k) {
-      const ImagePlan& plan = draft.plans[images[k]];
-      FileImageData& file = draft.files[images[k]];
-      if (!file.bytes.empty() && draft.coded[images[k]] == plan) continue;
-      file = candidates_.encoded(images[k], draft.pixels[images[k]], plan.coding, plan.quality,
-                                 reference_.wishes.fast());
-      draft.coded[images[k]] = plan;
-    }
+  parallel_each(reference_.context, images.size(), 1, [&](std::size_t k) {
+    const ImagePlan& plan = draft.plans[images[k]];
+    FileImageData& file = draft.files[images[k]];
+    if (!file.bytes.empty() && draft.coded[images[k]] == plan) return;
+    file = candidates_.encoded(images[k], draft.pixels[images[k]], plan.coding, plan.quality,
+                               reference_.wishes.fast());
+    draft.coded[images[k]] = plan;
   });
 }
 

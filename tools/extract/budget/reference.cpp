@@ -112,9 +112,8 @@ void LitCamera::cut(Picture& picture) const {
 LitViews::LitViews(const LitMesh& mesh, const std::vector<LitCamera>& cameras, const RunContext& context)
     : mesh_(&mesh), cameras_(cameras), views_(cameras.size()) {
   const RenderScene scene = render_scene(mesh.mesh, mesh.materials, mesh.texture_count);
-  parallel_for(context, cameras.size(), 1, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t v = begin; v < end; ++v)
-      views_[v] = look(scene, cameras[v].camera, cameras[v].side_px, serial(context), cameras[v].bands);
+  parallel_each(context, cameras.size(), 1, [&](std::size_t v) {
+    views_[v] = look(scene, cameras[v].camera, cameras[v].side_px, serial(context), cameras[v].bands);
   });
 }
 
@@ -183,12 +182,10 @@ std::vector<LitCamera> windows_of(const LitViews& views, std::uint32_t picture_p
 LitMeter::LitMeter(const LitViews& views, const std::vector<RenderTexture>& textures,
                    const RenderEnvironment& environment, const RunContext& context)
     : environment_(environment), reference_(views.count()), weights_(views.count()) {
-  parallel_for(context, views.count(), 1, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t v = begin; v < end; ++v) {
-      Picture picture = views.picture(v, textures, environment_, serial(context));
-      views.camera(v).cut(picture);
-      reference_[v] = prepare_flip(picture);
-    }
+  parallel_each(context, views.count(), 1, [&](std::size_t v) {
+    Picture picture = views.picture(v, textures, environment_, serial(context));
+    views.camera(v).cut(picture);
+    reference_[v] = prepare_flip(picture);
   });
   double sum = 0;
   for (std::size_t v = 0; v < views.count(); ++v)
@@ -200,9 +197,8 @@ LitMeter::LitMeter(const LitViews& views, const std::vector<RenderTexture>& text
 double LitMeter::difference(const LitViews& views, const std::vector<RenderTexture>& textures,
                             const RunContext& context) const {
   std::vector<double> parts(reference_.size());
-  parallel_for(context, parts.size(), 1, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t v = begin; v < end; ++v) parts[v] = part(v, views, v, textures, serial(context));
-  });
+  parallel_each(context, parts.size(), 1,
+                [&](std::size_t v) { parts[v] = part(v, views, v, textures, serial(context)); });
   double sum = 0;
   for (const double p : parts) sum += p;
   return sum;
@@ -241,9 +237,8 @@ std::vector<double> LitMeter::differences(const LitViews& views, const std::vect
     }
     if (seen.empty()) continue;
     const PictureVariants pictures = views.pictures(v, lists, all, environment_, context);
-    parallel_for(context, seen.size(), 1, [&](std::size_t begin, std::size_t end) {
-      for (std::size_t k = begin; k < end; ++k)
-        sums[seen[k]] += weights_[v] * flip_of(reference_[v], prepare_flip(pictures.picture(k + 1)));
+    parallel_each(context, seen.size(), 1, [&](std::size_t k) {
+      sums[seen[k]] += weights_[v] * flip_of(reference_[v], prepare_flip(pictures.picture(k + 1)));
     });
   }
   return sums;

@@ -243,9 +243,8 @@ AtlasSubject atlas_subject(Model model, const RunContext& context) {
   }
   const std::vector<bool> decoded = colour_images(model);
   AtlasSubject out = bare_subject(std::move(model));
-  parallel_for(context, images.size(), 1, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t i = begin; i < end; ++i)
-      if (decoded[i]) out.colours[i] = decode_image(images[i], FloatEncoding::kSrgb);
+  parallel_each(context, images.size(), 1, [&](std::size_t i) {
+    if (decoded[i]) out.colours[i] = decode_image(images[i], FloatEncoding::kSrgb);
   });
   for (std::size_t i = 0; i < images.size(); ++i)
     out.images[i] = {images[i].width_px, images[i].height_px, nullptr};

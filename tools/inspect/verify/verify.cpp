@@ -255,9 +255,8 @@ void check_table_streams(const TextureInfo& texture, const PlaneTables& t, std::
 std::uint64_t check_rung(const TextureInfo& texture, const PlaneTables& t, std::uint32_t rung,
                          const PlaneStreams& streams, const RunContext& context, Findings& findings) {
   std::vector<Findings> per_fragment(t.order.size());
-  parallel_for(context, t.order.size(), 1, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t k = begin; k < end; ++k)
-      check_fragment(texture, t, rung, t.order[k], streams, per_fragment[k]);
+  parallel_each(context, t.order.size(), 1, [&](std::size_t k) {
+    check_fragment(texture, t, rung, t.order[k], streams, per_fragment[k]);
   });
   for (Findings& f : per_fragment) findings.append(std::move(f));
   return t.order.size();
