@@ -158,6 +158,14 @@ std::uint64_t bytes_to_show(const PlaneTables& tables, std::size_t rung, std::si
   return bytes;
 }
 
+std::uint64_t bytes_of_rung(const PlaneTables& tables, std::size_t rung) {
+  const std::size_t fragments = tables.fragment_count();
+  std::uint64_t bytes = 0;
+  for (std::size_t k = tables.incremental ? 0 : rung * fragments; k < (rung + 1) * fragments; ++k)
+    bytes += tables.size_bytes[k];
+  return bytes;
+}
+
 std::uint64_t sum_of(const std::vector<std::uint32_t>& bytes) {
   std::uint64_t sum = 0;
   for (const std::uint32_t b : bytes) sum += b;

@@ -6,6 +6,8 @@ namespace texmesh {
 /// What a client must have of a fragment to show it at a rung: the rung's stream, with incremental tables
 /// those below it, too. 0 when it is not stored there.
 std::uint64_t bytes_to_show(const PlaneTables& tables, std::size_t rung, std::size_t fragment);
+/// Of all fragments.
+std::uint64_t bytes_of_rung(const PlaneTables& tables, std::size_t rung);
 /// eta_i (3.1) of one scale, by its row in the tables: feature counts min-max over covered fragments; 0 for
 /// the others.
 std::vector<float> density_of(const PlaneTables& tables, std::size_t row);

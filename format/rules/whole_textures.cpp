@@ -36,13 +36,6 @@ TexelGrowth growth_of(const TexturedObject& o, const WholeTexture& t, double dis
   return out;
 }
 
-double bytes_of_rung(const PlaneTables& t, std::uint32_t rung) {
-  double bytes = 0;
-  for (std::size_t r = t.incremental ? 0 : rung; r <= rung; ++r)
-    for (std::size_t f = 0; f < t.fragment_count(); ++f) bytes += t.size_bytes[r * t.fragment_count() + f];
-  return bytes;
-}
-
 /// Sums of one group's planes, by the surface that each of them has.
 class GroupSum {
  public:
@@ -65,7 +58,7 @@ class GroupSum {
                             curve_.halved(growth, object_.textures[texture.plane].mip)};
     flip_ += weight * combined_flip(object_.quality, parts);
     weight_ += weight;
-    choice_.bytes += bytes_of_rung(t, texture.rung);
+    choice_.bytes += static_cast<double>(bytes_of_rung(t, texture.rung));
   }
   GroupChoice finish() {
     choice_.flip = weight_ > 0 ? flip_ / weight_ : 0;

@@ -474,29 +474,11 @@ void number_wedges(const Mesh& attributes, const Kept& kept, const ManifoldSplit
   }
 }
 
-/// Per position the area-weighted sum of its triangles' normals, unit length.
-std::vector<Vec3f> smooth_normals(const Mesh& m) {
-  std::vector<Vec3d> sum(m.positions.size());
-  for (std::uint32_t t = 0; t < m.triangles.size(); ++t) {
-    const Vec3d a = to_double(m.positions[m.position_of(t, 0)]);
-    const Vec3d n = cross(to_double(m.positions[m.position_of(t, 1)]) - a,
-                          to_double(m.positions[m.position_of(t, 2)]) - a);
-    for (int k = 0; k < 3; ++k) sum[m.position_of(t, k)] = sum[m.position_of(t, k)] + n;
-  }
-  std::vector<Vec3f> normals(m.positions.size());
-  for (std::size_t p = 0; p < sum.size(); ++p) {
-    const double l = length(sum[p]);
-    // No direction: slivers only, or a fold that cancels out. Any unit vector is as good as another.
-    normals[p] = l > 0 ? to_float(sum[p] * (1 / l)) : Vec3f{0, 1, 0};
-  }
-  return normals;
-}
-
 void fill_normals(Mesh& m, bool add_missing) {
   const bool missing = m.normals.empty();
   if (missing && !add_missing) return;
   if (!missing && std::find(m.normals.begin(), m.normals.end(), Vec3f{}) == m.normals.end()) return;
-  const std::vector<Vec3f> smooth = smooth_normals(m);
+  const std::vector<Vec3f> smooth = position_normals(m);
   m.normals.resize(m.wedge_count());
   for (std::size_t w = 0; w < m.wedge_count(); ++w)
     if (m.normals[w] == Vec3f{}) m.normals[w] = smooth[m.wedge_position[w]];

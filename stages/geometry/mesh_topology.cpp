@@ -144,6 +144,22 @@ EdgeTable group_edges(std::span<const std::uint32_t> corner_position, std::size_
   return table;
 }
 
+std::vector<Vec3f> position_normals(const Mesh& mesh) {
+  std::vector<Vec3d> sum(mesh.positions.size());
+  for (const Triangle& t : mesh.triangles) {
+    const auto [a, b, c] = corner_points(mesh, t);
+    const Vec3d n = cross(b - a, c - a);
+    for (const std::uint32_t w : t) sum[mesh.wedge_position[w]] = sum[mesh.wedge_position[w]] + n;
+  }
+  std::vector<Vec3f> out;
+  for (const Vec3d& n : sum) {
+    const double l = length(n);
+    // No direction: slivers only, or a fold that cancels out. Any unit vector is as good as another.
+    out.push_back(l > 0 ? to_float(n * (1 / l)) : Vec3f{0, 1, 0});
+  }
+  return out;
+}
+
 double surface_area(const Mesh& mesh, const std::vector<Triangle>& triangles) {
   double area = 0;
   for (const Triangle& t : triangles) {

@@ -31,6 +31,9 @@ inline std::array<Vec3d, 3> corner_points(const Mesh& mesh, const Triangle& t) {
 /// Of all triangles, which index the mesh's wedges.
 double surface_area(const Mesh& mesh, const std::vector<Triangle>& triangles);
 
+/// Per position the area-weighted sum of its triangles' normals, unit length.
+std::vector<Vec3f> position_normals(const Mesh& mesh);
+
 /// All corners of triangles, which must outlive them: 3 t + k is corner k of triangle t.
 inline std::span<const std::uint32_t> corners_of(std::span<const Triangle> triangles) {
   return {reinterpret_cast<const std::uint32_t*>(triangles.data()), 3 * triangles.size()};

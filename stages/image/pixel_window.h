@@ -24,6 +24,16 @@ struct PixelWindow {
   CoverageWindow coverage{};
 };
 
+/// A copy of a part, which lies within the pixels.
+inline Pixels cut(const Pixels& pixels, const TexelRectangle& r) {
+  Pixels out{r.width_px, r.height_px, pixels.channels, {}};
+  for (std::uint32_t y = r.top_px; y < r.bottom_px(); ++y) {
+    const std::uint8_t* row = pixels.at(r.left_px, y);
+    out.data.insert(out.data.end(), row, row + std::size_t{r.width_px} * pixels.channels);
+  }
+  return out;
+}
+
 /// StageError of `stage` unless every plane has pixels of its channels and of the size of all its fragments,
 /// which is what fill_planes() returns.
 inline void check_pixels(const char* stage, const Fragments& fragments, const std::vector<Pixels>& pixels) {

@@ -262,12 +262,17 @@ Pixels reduced(const Pixels& from, std::uint32_t used_width, std::uint32_t used_
 
 Pixels joined_alpha(const Pixels& colours, const Pixels& alpha) {
   Pixels out{colours.width_px, colours.height_px, 4, {}};
-  out.data.reserve(4 * alpha.data.size());
-  for (std::size_t i = 0; i < alpha.data.size(); ++i) {
-    const std::uint8_t* c = colours.data.data() + i * colours.channels;
-    for (std::uint32_t k = 0; k < 3; ++k) out.data.push_back(c[colours.channels == 1 ? 0 : k]);
-    out.data.push_back(alpha.data[i]);
-  }
+  out.data.reserve(std::size_t{4} * colours.width_px * colours.height_px);
+  const auto place = [](std::uint32_t at, std::uint32_t of, std::uint32_t to) {
+    return of == to ? at : static_cast<std::uint32_t>(std::uint64_t{at} * to / of);
+  };
+  for (std::uint32_t y = 0; y < colours.height_px; ++y)
+    for (std::uint32_t x = 0; x < colours.width_px; ++x) {
+      const std::uint8_t* c = colours.at(x, y);
+      for (std::uint32_t k = 0; k < 3; ++k) out.data.push_back(c[colours.channels == 1 ? 0 : k]);
+      out.data.push_back(*alpha.at(place(x, colours.width_px, alpha.width_px),
+                                   place(y, colours.height_px, alpha.height_px)));
+    }
   return out;
 }
 

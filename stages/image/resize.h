@@ -36,7 +36,7 @@ Pixels eighth_of(const Pixels& from, std::uint32_t width_px, std::uint32_t heigh
 Pixels reduced(const Pixels& from, std::uint32_t used_width, std::uint32_t used_height, std::uint32_t width,
                std::uint32_t height, Averaging kind, float sharpening = 0);
 
-/// Four channels, of colours of one or three and as many texels of alpha.
+/// Four channels, of colours of one or three and alpha, each texel of which covers as many of theirs.
 Pixels joined_alpha(const Pixels& colours, const Pixels& alpha);
 /// reduced() of all texels, of 1 to 4 channels. Alpha counts apart, as numbers; two channels become four.
 Pixels reduced_with_alpha(const Pixels& from, std::uint32_t width, std::uint32_t height, Averaging kind);

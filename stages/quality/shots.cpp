@@ -42,13 +42,6 @@ double share_compared(const ShownRows& view, const std::vector<std::uint8_t>& co
 /// the whole picture, one pixel wide, covers 0.5 %.
 constexpr double kLeastCovered = 0.002;
 
-BoundingSphere sphere_of(const Mesh& mesh) {
-  if (mesh.positions.empty()) throw StageError("quality", "S_0", "positions", "none");
-  const BoundingSphere sphere = bounding_sphere(mesh.positions);
-  if (!(sphere.radius > 0)) throw StageError("quality", "S_0", "an extent above 0", "one point");
-  return sphere;
-}
-
 /// The sphere around the place where nearly all positions lie, whatever a few others do.
 BoundingSphere crowd_sphere(const Mesh& mesh, const BoundingSphere& bounds) {
   constexpr double kCrowd = 0.98, kMargin = 1.25;
@@ -305,7 +298,7 @@ double looked_at_px(std::size_t triangles) {
 
 Coverage frame_object(const RenderScene& scene, const TextureSizes& sizes, double extent, int views,
                       double largest_px, Notes& notes, const RunContext& context) {
-  Coverage out{{sphere_of(*scene.mesh), extent}, 0, {}, {}};
+  Coverage out{{sphere_around(*scene.mesh, "quality"), extent}, 0, {}, {}};
   // A sphere around a box is at most so much wider than its longest side: O_V of other positions than these
   // would ask for huge pictures.
   out.frame.extent = std::max(extent, 1.15 * out.frame.sphere.radius);

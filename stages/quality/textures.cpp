@@ -9,6 +9,7 @@
 #include "stages/data/stage.h"
 #include "stages/fragment_codec/fragment_codec.h"
 #include "stages/image/decode_image.h"
+#include "stages/image/pixel_window.h"
 #include "stages/jpeg/jpeg.h"
 
 namespace texmesh {
@@ -56,16 +57,6 @@ double area_in_texture(const Mesh& mesh, const TextureSlot& slot, const Triangle
   return std::fabs((static_cast<double>(a.x) * static_cast<double>(b.y) -
                     static_cast<double>(a.y) * static_cast<double>(b.x)) *
                    static_cast<double>(s.x) * static_cast<double>(s.y) * size.x * size.y);
-}
-
-// A fragment of the source, cut out of the plane's pixels.
-Pixels cut(const Pixels& pixels, const TexelRectangle& r) {
-  Pixels out{r.width_px, r.height_px, pixels.channels, {}};
-  for (std::uint32_t y = r.top_px; y < r.bottom_px(); ++y) {
-    const std::uint8_t* row = pixels.at(r.left_px, y);
-    out.data.insert(out.data.end(), row, row + std::size_t{r.width_px} * pixels.channels);
-  }
-  return out;
 }
 
 /// Where a plane's channels lie among those of a texture's level.

@@ -9,11 +9,6 @@ constexpr float kNone = 1e-20f;  // squares below this are no length
 
 Vec3f xyz(Vec4f v) { return {v.x, v.y, v.z}; }
 
-bool same_place(const TextureSlot& a, const TextureSlot& b) {
-  return a.uv_set == b.uv_set && a.wrap_s == b.wrap_s && a.wrap_t == b.wrap_t &&
-         a.mag_filter == b.mag_filter && a.min_filter == b.min_filter && a.transform == b.transform;
-}
-
 std::size_t index_of(TextureUse use) { return static_cast<std::size_t>(use); }
 
 Vec3f mixed(Vec3f a, Vec3f b, float part) { return a + (b - a) * part; }
@@ -115,7 +110,7 @@ FragmentShader::Read FragmentShader::prepared_read(const TextureSlot& use,
   if (texture.levels.empty() || uv.empty()) return {};
   const Vec2<std::uint32_t> size_px{texture.width_px, texture.height_px};
   std::size_t site = 0;
-  while (site < sites.size() && !(sites[site].size_px == size_px && same_place(*sites[site].use, use)))
+  while (site < sites.size() && !(sites[site].size_px == size_px && sites[site].use->is_placed_like(use)))
     ++site;
   if (site == sites.size())
     sites.push_back({&use, size_px, texture.first_level, &uv, uv_matrix(use.transform)});

@@ -466,19 +466,26 @@ class Tile {
 
 }  // namespace
 
+BoundingSphere sphere_around(const Mesh& finest, const char* stage) {
+  if (finest.positions.empty()) throw StageError(stage, "S_0", "positions", "none");
+  const BoundingSphere sphere = bounding_sphere(finest.positions);
+  if (!(sphere.radius > 0)) throw StageError(stage, "S_0", "an extent above 0", "one point");
+  return sphere;
+}
+
+ViewCamera view_towards(Vec3d z, const BoundingSphere& bounds) {
+  const Vec3d x = normalized(cross(Vec3d{0, 1, 0}, z));
+  return {x, cross(z, x), z, bounds.centre, bounds.radius};
+}
+
 ViewCamera camera_of(int index, int count, Vec3d centre, double radius) {
   // A Fibonacci lattice on the sphere, starting a little to the side of the front.
   const double golden = portable::kPi * (3 - std::sqrt(5.0));
   const double height = count == 1 ? 0.2 : 1 - 2 * (index + 0.5) / count,
                ring = std::sqrt(1 - height * height);
   const double angle = 0.4 + golden * index;
-  ViewCamera camera;
-  camera.z = {ring * portable::sin(angle), height, ring * portable::cos(angle)};
-  camera.x = normalized(cross(Vec3d{0, 1, 0}, camera.z));
-  camera.y = cross(camera.z, camera.x);
-  camera.centre = centre;
-  camera.radius = radius;
-  return camera;
+  const Vec3d z{ring * portable::sin(angle), height, ring * portable::cos(angle)};
+  return view_towards(z, {centre, radius});
 }
 
 RenderCamera perspective_camera(const ViewCamera& view, double fov_degrees) {

@@ -12,6 +12,9 @@ struct ViewCamera {
   Vec3d centre;
   double radius = 1;
 };
+/// Around S_0. StageError of `stage` where it has no extent.
+BoundingSphere sphere_around(const Mesh& finest, const char* stage);
+ViewCamera view_towards(Vec3d z, const BoundingSphere& bounds);
 /// The camera of view `index`, 0 <= index < count. The `count` directions are spread evenly over the sphere.
 /// The directions are the same for every model.
 ViewCamera camera_of(int index, int count, Vec3d centre, double radius);
@@ -60,6 +63,10 @@ struct TextureSlot {
   MagFilter mag_filter = MagFilter::kLinear;
   MinFilter min_filter = MinFilter::kTrilinear;
   UvTransform transform;
+  bool is_placed_like(const TextureSlot& o) const {
+    return uv_set == o.uv_set && wrap_s == o.wrap_s && wrap_t == o.wrap_t && mag_filter == o.mag_filter &&
+           min_filter == o.min_filter && transform == o.transform;
+  }
 };
 
 /// The metallic-roughness material of glTF 2.0. Factors are linear and lie in the ranges that glTF allows.

@@ -5,6 +5,7 @@
 #include "stages/geometry/mesh_topology.h"
 #include "stages/gltf/scale_glb.h"
 #include "stages/image/png_writer.h"
+#include "stages/image/resize.h"
 #include "stages/jpeg/jpeg.h"
 #include "stages/jpeg/jpeg_coder.h"
 #include "stages/scales/vertex_split.h"
@@ -13,21 +14,6 @@ namespace texmesh {
 namespace {
 
 constexpr std::uint64_t kMaxPreviewPixels = 1u << 24;
-
-std::vector<std::uint8_t> combine(const Pixels& colour, const Pixels& alpha) {
-  Pixels out{colour.width_px, colour.height_px, 4, {}};
-  out.data.reserve(std::size_t{4} * colour.width_px * colour.height_px);
-  for (std::uint32_t y = 0; y < colour.height_px; ++y)
-    for (std::uint32_t x = 0; x < colour.width_px; ++x) {
-      const std::uint8_t* c = colour.at(x, y);
-      // The two previews may have different sizes: each is as fine as its bytes allow.
-      const auto ax = static_cast<std::uint32_t>(std::uint64_t{x} * alpha.width_px / colour.width_px);
-      const auto ay = static_cast<std::uint32_t>(std::uint64_t{y} * alpha.height_px / colour.height_px);
-      for (std::uint32_t k = 0; k < 3; ++k) out.data.push_back(c[colour.channels == 1 ? 0 : k]);
-      out.data.push_back(*alpha.at(ax, ay));
-    }
-  return write_png(out);
-}
 
 /// Per source image that has planes: the colour plane's preview, or a PNG with alpha where an alpha plane
 /// stands beside it.
@@ -42,8 +28,9 @@ GlbImages preview_images(const Fragments& fragments, const Previews& previews) {
           fragments.planes[j].mip > 0)
         continue;
       image.mime_type = "image/png";
-      image.bytes = combine(decode_jpeg(previews.planes.at(i).file, kMaxPreviewPixels),
-                            decode_jpeg(previews.planes.at(j).file, kMaxPreviewPixels));
+      // The two previews may have different sizes: each is as fine as its bytes allow.
+      image.bytes = write_png(joined_alpha(decode_jpeg(previews.planes.at(i).file, kMaxPreviewPixels),
+                                           decode_jpeg(previews.planes.at(j).file, kMaxPreviewPixels)));
     }
     out.push_back(std::move(image));
   }

@@ -25,15 +25,6 @@ float within_unit(float x) { return x > 0 ? (x < 1 ? x : 1) : 0; }
 
 Vec3d area_normal(const std::array<Vec3d, 3>& c) { return cross(c[1] - c[0], c[2] - c[0]); }
 
-bool placed_alike(const TextureSlot& a, const TextureSlot& b) {
-  return a.uv_set == b.uv_set && a.wrap_s == b.wrap_s && a.wrap_t == b.wrap_t &&
-         a.mag_filter == b.mag_filter && a.min_filter == b.min_filter && a.transform == b.transform;
-}
-
-bool read_alike(const TextureSlot& a, const TextureSlot& b) {
-  return a.texture == b.texture && placed_alike(a, b);
-}
-
 }  // namespace
 
 MaterialGroup group_of(const RenderMaterial& material) {
@@ -104,7 +95,7 @@ class BakeSource::Reader {
 
   Vec4f read(const TextureSlot& slot) {
     const RenderTexture& texture = source_.shown_.textures[static_cast<std::size_t>(slot.texture)];
-    if (!slot_ || !placed_alike(*slot_, slot) || texture.width_px != like_->width_px ||
+    if (!slot_ || !slot_->is_placed_like(slot) || texture.width_px != like_->width_px ||
         texture.height_px != like_->height_px || texture.first_level != like_->first_level) {
       site_ = TextureSite({texture.width_px, texture.height_px}, texture.first_level, slot,
                           footprint_of(slot, texture));
@@ -204,7 +195,8 @@ void BakeSource::add_data(Reader& reader, const RenderMaterial& m, BakeSample& o
   out.roughness = within_unit(m.roughness * texel.y);
   out.metallic = within_unit(m.metallic * texel.z);
   if (occlusion.texture < 0) return;
-  if (!read_alike(occlusion, rough_metal)) texel = reader.read(occlusion);
+  if (occlusion.texture != rough_metal.texture || !occlusion.is_placed_like(rough_metal))
+    texel = reader.read(occlusion);
   out.occlusion = within_unit(1 + (texel.x - 1) * m.occlusion_strength);
 }
 

@@ -65,11 +65,6 @@ std::vector<std::uint8_t> textures_read(const LitViews& views, std::size_t view)
   return out;
 }
 
-double longest_side(const Mesh& mesh) {
-  const double side = to_double(bounding_box(mesh.positions)).longest_side();
-  return side > 0 ? side : 1;
-}
-
 double area_of(const Mesh& mesh, std::size_t triangle) {
   const Triangle& t = mesh.triangles[triangle];
   const auto at = [&](std::size_t k) { return to_double(mesh.positions[t[k]]); };
@@ -84,14 +79,12 @@ double texels_on(const Mesh& mesh, std::size_t triangle, int texcoord, const Tex
   return std::abs((b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x)) / 2;
 }
 
-BoundingSphere sphere_of(const Mesh& mesh) {
-  if (mesh.positions.empty()) throw StageError("extract", "S_0", "positions", "none");
-  const BoundingSphere sphere = bounding_sphere(mesh.positions);
-  if (!(sphere.radius > 0)) throw StageError("extract", "S_0", "an extent above 0", "one point");
-  return sphere;
-}
-
 }  // namespace
+
+double longest_side(const Mesh& mesh) {
+  const double side = to_double(bounding_box(mesh.positions)).longest_side();
+  return side > 0 ? side : 1;
+}
 
 std::vector<LitCamera> cameras_around(const BoundingSphere& bounds, int count, std::uint32_t side_px) {
   std::vector<LitCamera> out;
@@ -258,7 +251,7 @@ Reference::Reference(PackageReader& from, const ExtractBudget& asked, const Outp
     return;
   }
   source = read_model(scale_file(package, 0, context), mesh_path(0), context);
-  const BoundingSphere sphere = sphere_of(source.mesh);
+  const BoundingSphere sphere = sphere_around(source.mesh, "extract");
   light = normal_samples(source.mesh);
   extent = longest_side(source.mesh);
   cameras = cameras_around(sphere, kViews, side_px);

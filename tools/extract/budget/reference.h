@@ -20,6 +20,9 @@ struct LitMesh {
   std::size_t texture_count = 0;
 };
 
+/// Of its box; 1 where it has no extent.
+double longest_side(const Mesh& mesh);
+
 /// A square picture that is taken of every mesh.
 struct LitCamera {
   RenderCamera camera;

@@ -146,16 +146,11 @@ bool is_simple(const Json& root, const std::vector<ProxyMap>& maps) {
   });
 }
 
-double side_of_box(const Mesh& mesh) {
-  const double side = to_double(bounding_box(mesh.positions)).longest_side();
-  return side > 0 ? side : 1;
-}
-
 /// The mesh as floats under Draco, before it is coded as a file asks for.
 StandaloneGlb uncoded(const Mesh& mesh, const std::string& entry) {
   SplitStreamHead head;
   const Box3f box = bounding_box(mesh.positions);
-  head.position = {kUncodedBits, {box.min.x, box.min.y, box.min.z}, static_cast<float>(side_of_box(mesh))};
+  head.position = {kUncodedBits, {box.min.x, box.min.y, box.min.z}, static_cast<float>(longest_side(mesh))};
   return {write_streamed_scale(mesh, head, {}), entry, std::nullopt};
 }
 
@@ -237,7 +232,7 @@ const ProxyMap* ProxyParts::map_of(ProxyMap::Use use) const {
   return found == maps_.end() ? nullptr : &*found;
 }
 
-double ProxyParts::extent() const { return side_of_box(meshes_.front()); }
+double ProxyParts::extent() const { return longest_side(meshes_.front()); }
 
 Json ProxyParts::materials_of(const ProxyMapChoice& choice) const {
   Json root = Json::parse(json_);

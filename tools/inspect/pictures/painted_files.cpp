@@ -4,6 +4,7 @@
 
 #include "format/base/portable_math.h"
 #include "format/rules/allocation.h"
+#include "stages/geometry/mesh_topology.h"
 #include "stages/gltf/glb_writer.h"
 #include "stages/image/png_writer.h"
 #include "stages/render/shade.h"
@@ -34,19 +35,11 @@ std::size_t add_values(GlbWriter& glb, const std::vector<T>& values, const char*
   return glb.add_accessor(std::move(accessor));
 }
 
-/// Area-weighted over all triangles of a position: a picture needs shading, not creases.
+/// A picture needs shading, not creases.
 std::vector<Vec3f> smooth_normals(const Mesh& mesh) {
-  std::vector<Vec3d> sum(mesh.positions.size());
-  for (std::uint32_t t = 0; t < mesh.triangles.size(); ++t) {
-    const auto at = [&](int k) { return to_double(mesh.positions[mesh.position_of(t, k)]); };
-    const Vec3d n = cross(at(1) - at(0), at(2) - at(0));
-    for (int k = 0; k < 3; ++k) sum[mesh.position_of(t, k)] = sum[mesh.position_of(t, k)] + n;
-  }
+  const std::vector<Vec3f> of_positions = position_normals(mesh);
   std::vector<Vec3f> out;
-  for (std::uint32_t p : mesh.wedge_position) {
-    const Vec3d n = normalized(sum[p]);
-    out.push_back(n == Vec3d{} ? Vec3f{0, 1, 0} : to_float(n));
-  }
+  for (const std::uint32_t p : mesh.wedge_position) out.push_back(of_positions[p]);
   return out;
 }
 
@@ -126,13 +119,7 @@ constexpr double kElevation = 0.35;  // sine of the angle the views look down at
 
 ViewCamera camera_at(double angle, const BoundingSphere& bounds) {
   const double ring = std::sqrt(1 - kElevation * kElevation);
-  ViewCamera camera;
-  camera.z = {ring * portable::sin(angle), kElevation, ring * portable::cos(angle)};
-  camera.x = normalized(cross(Vec3d{0, 1, 0}, camera.z));
-  camera.y = cross(camera.z, camera.x);
-  camera.centre = bounds.centre;
-  camera.radius = bounds.radius;
-  return camera;
+  return view_towards({ring * portable::sin(angle), kElevation, ring * portable::cos(angle)}, bounds);
 }
 
 /// A bar with four sides along a line; a cube for a point.
@@ -175,15 +162,15 @@ Mesh lit_from(Vec3d towards_viewer, const Mesh& mesh) {
   out.positions = mesh.positions;
   out.triangle_material = mesh.triangle_material;
   for (std::uint32_t t = 0; t < mesh.triangles.size(); ++t) {
-    const auto at = [&](int k) { return to_double(mesh.positions[mesh.position_of(t, k)]); };
-    const Vec3d face = normalized(cross(at(1) - at(0), at(2) - at(0)));
+    const auto [a, b, c] = corner_points(mesh, mesh.triangles[t]);
+    const Vec3d face = normalized(cross(b - a, c - a));
     const auto light = static_cast<float>(kAmbient + (1 - kAmbient) * std::fabs(dot(face, towards_viewer)));
     const auto first = static_cast<std::uint32_t>(out.wedge_position.size());
     out.triangles.push_back({first, first + 1, first + 2});
     for (const std::uint32_t w : mesh.triangles[t]) {
       out.wedge_position.push_back(mesh.wedge_position[w]);
-      const Vec4f c = mesh.colours.empty() ? Vec4f{1, 1, 1, 1} : mesh.colours[w];
-      out.colours.push_back({c.x * light, c.y * light, c.z * light, 1});
+      const Vec4f colour = mesh.colours.empty() ? Vec4f{1, 1, 1, 1} : mesh.colours[w];
+      out.colours.push_back({colour.x * light, colour.y * light, colour.z * light, 1});
       if (!mesh.uv0.empty()) out.uv0.push_back(mesh.uv0[w]);
       if (!mesh.uv1.empty()) out.uv1.push_back(mesh.uv1[w]);
     }

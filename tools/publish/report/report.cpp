@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 
 #include "format/base/portable_math.h"
+#include "format/rules/allocation.h"
 #include "tools/inspect/dump/dump.h"
 #include "tools/publish/pages/page.h"
 
@@ -418,9 +419,7 @@ std::uint64_t texture_bytes(PackageReader& package, const std::vector<PlaneChoic
   if (way == 0) return bytes;
   for (const PlaneChoice& choice : planes) {
     const PlaneTables& t = package.tables().planes[choice.plane];
-    const std::size_t rung = std::min(way, t.rung_count()) - 1;
-    for (std::size_t r = t.incremental ? 0 : rung; r <= rung; ++r)
-      for (std::size_t f = 0; f < t.fragment_count(); ++f) bytes += t.size_bytes[r * t.fragment_count() + f];
+    bytes += bytes_of_rung(t, std::min(way, t.rung_count()) - 1);
   }
   return bytes;
 }

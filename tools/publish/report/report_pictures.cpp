@@ -4,6 +4,7 @@
 
 #include "format/rules/allocation.h"
 #include "pipeline/io/markup.h"
+#include "stages/image/pixel_window.h"
 #include "stages/image/png_writer.h"
 #include "stages/render/shade.h"
 
@@ -24,32 +25,20 @@ constexpr std::array<Srgb, 9> kStops{{{0, 0, 4},
 constexpr std::uint32_t kMargin = 6;  // px around the object
 constexpr int kMostEnlarged = 6;
 
-struct Rectangle {
-  std::uint32_t left = 0, top = 0, right = 0, bottom = 0;  // right and bottom are outside
-};
-
 /// What either picture shows with its margin; all where they show nothing.
-Rectangle shown_part(const Picture& a, const Picture& b) {
+TexelRectangle shown_part(const Picture& a, const Picture& b) {
   const std::uint32_t side = a.side_px;
-  Rectangle r{side, side, 0, 0};
+  std::uint32_t left = side, top = side, right = 0, bottom = 0;  // right and bottom are outside
   for (std::uint32_t y = 0; y < side; ++y)
     for (std::uint32_t x = 0; x < side; ++x) {
       const std::size_t i = std::size_t{y} * side + x;
       if (!a.covered[i] && !b.covered[i]) continue;
-      r = {std::min(r.left, x), std::min(r.top, y), std::max(r.right, x + 1), std::max(r.bottom, y + 1)};
+      left = std::min(left, x), top = std::min(top, y);
+      right = std::max(right, x + 1), bottom = std::max(bottom, y + 1);
     }
-  if (r.left >= r.right) return {0, 0, side, side};
-  return {r.left - std::min(r.left, kMargin), r.top - std::min(r.top, kMargin),
-          std::min(r.right + kMargin, side), std::min(r.bottom + kMargin, side)};
-}
-
-Pixels cut(const Pixels& pixels, const Rectangle& r) {
-  Pixels out{r.right - r.left, r.bottom - r.top, pixels.channels, {}};
-  for (std::uint32_t y = r.top; y < r.bottom; ++y) {
-    const std::uint8_t* row = pixels.at(r.left, y);
-    out.data.insert(out.data.end(), row, row + std::size_t{out.width_px} * pixels.channels);
-  }
-  return out;
+  if (left >= right) return {0, 0, side, side};
+  left -= std::min(left, kMargin), top -= std::min(top, kMargin);
+  return {left, top, std::min(right + kMargin, side) - left, std::min(bottom + kMargin, side) - top};
 }
 
 constexpr double kLongerSide = 360;  // px on the page
@@ -87,12 +76,11 @@ std::string heat_hex(double value) { return hex_of(heat_colour(value)); }
 
 std::string picture_row(const PictureRow& row, const Picture& reference, const Picture& tested,
                         std::vector<ReportFile>& files) {
-  const Rectangle part = shown_part(reference, tested);
+  const TexelRectangle part = shown_part(reference, tested);
   const FlipPicture a = prepare_flip(reference), b = prepare_flip(tested);
   const Pixels heat = heat_picture(flip_map(a, b), reference.side_px, kFullHeat);
-  const std::uint32_t width = part.right - part.left, height = part.bottom - part.top;
   const int times =
-      std::clamp(static_cast<int>(row.enlarge_to_px / static_cast<double>(width)), 1, kMostEnlarged);
+      std::clamp(static_cast<int>(row.enlarge_to_px / static_cast<double>(part.width_px)), 1, kMostEnlarged);
   std::string out = "<div class=\"row\">\n";
   const auto add = [&](const std::string& ending, const std::string& name, const std::string& alt,
                        const Pixels& pixels) {
@@ -100,7 +88,7 @@ std::string picture_row(const PictureRow& row, const Picture& reference, const P
     out += fmt::format(
         "<div><p class=\"quiet\">{}</p><img{} src=\"{}\" width=\"{}\" height=\"{}\" alt=\"{}\"></div>\n",
         name, times > 1 ? " class=\"enlarged\"" : "", markup_escaped(files.back().path),
-        width * static_cast<std::uint32_t>(times), height * static_cast<std::uint32_t>(times),
+        part.width_px * static_cast<std::uint32_t>(times), part.height_px * static_cast<std::uint32_t>(times),
         markup_escaped(alt));
   };
   add("-reference", row.reference_name, row.alt + ", the reference", encode_srgb(reference));
