@@ -4,6 +4,7 @@
 #include <numeric>
 
 #include "format/base/portable_math.h"
+#include "format/model/add_wedge.h"
 #include "format/model/material_extensions.h"
 
 namespace texmesh {
@@ -175,18 +176,6 @@ void TangentMaker::group_corners() {
   }
 }
 
-/// A wedge with all values of another.
-std::uint32_t repeat_wedge(Mesh& mesh, std::uint32_t wedge) {
-  const auto repeat = [wedge](auto& values) {
-    if (values.empty()) return;
-    const auto value = values[wedge];
-    values.push_back(value);
-  };
-  repeat(mesh.wedge_position), repeat(mesh.uv0), repeat(mesh.uv1), repeat(mesh.normals);
-  repeat(mesh.colours), repeat(mesh.tangents);
-  return static_cast<std::uint32_t>(mesh.wedge_count() - 1);
-}
-
 void give_tangents(Mesh& mesh, const TangentMaker& maker) {
   // Group of the wedge itself; of another set of coordinates.
   std::vector<std::uint32_t> first(mesh.wedge_count(), kNoIndex);
@@ -204,7 +193,8 @@ void give_tangents(Mesh& mesh, const TangentMaker& maker) {
     }
     const auto [own, is_new] = others.try_emplace({wedge, group}, 0);
     if (is_new) {
-      own->second = repeat_wedge(mesh, wedge);
+      own->second = static_cast<std::uint32_t>(mesh.wedge_count());
+      add_wedge(mesh, mesh, wedge, mesh.wedge_position[wedge]);
       mesh.tangents.back() = maker.tangent(group);
     }
     wedge = own->second;

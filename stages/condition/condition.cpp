@@ -4,6 +4,7 @@
 #include <numeric>
 #include <tuple>
 
+#include "format/model/add_wedge.h"
 #include "stages/base/run_context.h"
 #include "stages/geometry/mesh_topology.h"
 
@@ -431,15 +432,6 @@ std::vector<std::uint32_t> number_positions(const Mesh& in, const ManifoldSplit&
   return number;
 }
 
-void append_wedge(const Mesh& from, std::uint32_t w, std::uint32_t position, Mesh& to) {
-  to.wedge_position.push_back(position);
-  if (!from.uv0.empty()) to.uv0.push_back(from.uv0[w]);
-  if (!from.uv1.empty()) to.uv1.push_back(from.uv1[w]);
-  if (!from.normals.empty()) to.normals.push_back(from.normals[w]);
-  if (!from.colours.empty()) to.colours.push_back(from.colours[w]);
-  if (!from.tangents.empty()) to.tangents.push_back(from.tangents[w]);
-}
-
 /// Wedges in the input's order, then one for every wedge and position that a split added.
 void number_wedges(const Mesh& attributes, const Kept& kept, const ManifoldSplit& split,
                    const std::vector<std::uint32_t>& position_number, Mesh& out) {
@@ -457,12 +449,12 @@ void number_wedges(const Mesh& attributes, const Kept& kept, const ManifoldSplit
     if (number[w] == kNoIndex) continue;
     const std::uint32_t position = position_number[number[w]];
     number[w] = static_cast<std::uint32_t>(out.wedge_count());
-    append_wedge(attributes, w, position, out);
+    add_wedge(out, attributes, w, position);
   }
   std::sort(added.begin(), added.end());
   added.erase(std::unique(added.begin(), added.end()), added.end());
   const auto first_added = static_cast<std::uint32_t>(out.wedge_count());
-  for (const auto& [p, w] : added) append_wedge(attributes, w, position_number[p], out);
+  for (const auto& [p, w] : added) add_wedge(out, attributes, w, position_number[p]);
   out.triangles.resize(kept.source.size());
   for (std::size_t c = 0; c < split.corner_position.size(); ++c) {
     const std::uint32_t w = kept.wedges[c / 3][c % 3], p = split.corner_position[c];

@@ -1,5 +1,6 @@
 // What the artefacts of stages say of themselves.
 
+#include "format/model/add_wedge.h"
 #include "stages/data/conditioned_mesh.h"
 #include "stages/data/ladder.h"
 #include "stages/data/nested_scales.h"
@@ -31,15 +32,10 @@ Mesh extract_scale(const NestedScales& scales, const NestedScale& scale) {
     position[p] = static_cast<std::uint32_t>(out.positions.size());
     out.positions.push_back(in.positions[p]);
   }
-  for (std::size_t w = 0; w < wedge.size(); ++w) {
+  for (std::uint32_t w = 0; w < wedge.size(); ++w) {
     if (wedge[w] == kNoIndex) continue;
     wedge[w] = static_cast<std::uint32_t>(out.wedge_position.size());
-    out.wedge_position.push_back(position[in.wedge_position[w]]);
-    auto keep = [w](const auto& from, auto& to) {
-      if (!from.empty()) to.push_back(from[w]);
-    };
-    keep(in.uv0, out.uv0), keep(in.uv1, out.uv1), keep(in.normals, out.normals),
-        keep(in.colours, out.colours), keep(in.tangents, out.tangents);
+    add_wedge(out, in, w, position[in.wedge_position[w]]);
   }
   out.triangles.reserve(scale.triangles.size());
   for (std::size_t i = 0; i < scale.triangles.size(); ++i) {

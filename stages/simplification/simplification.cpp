@@ -1,4 +1,5 @@
 #include "format/base/portable_math.h"
+#include "format/model/add_wedge.h"
 #include "stages/base/parallel.h"
 #include "stages/geometry/distance.h"
 #include "stages/geometry/mesh_topology.h"
@@ -87,15 +88,7 @@ void append_new_wedges(const CollapseMesh& engine, Mesh& mesh, std::vector<Neste
         if (id == kNoIndex) {
           const CollapseMesh::NewWedge& wedge = engine.new_wedges()[w - old_count];
           id = static_cast<std::uint32_t>(mesh.wedge_count());
-          mesh.wedge_position.push_back(wedge.position);
-          auto repeat = [&](auto& values) {
-            if (!values.empty()) {
-              const auto value = values[wedge.source];
-              values.push_back(value);
-            };
-          };
-          repeat(mesh.uv0), repeat(mesh.uv1), repeat(mesh.normals), repeat(mesh.colours),
-              repeat(mesh.tangents);
+          add_wedge(mesh, mesh, wedge.source, wedge.position);
         }
         w = id;
       }
