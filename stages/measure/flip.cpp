@@ -125,22 +125,22 @@ class FlipFilter {
     for (auto& row : {&luma_row_, &part_, &other_}) row->resize(whole_blocks(spans.side_px));
   }
 
-  /// Rows are asked for one after the other.
+  /// The pixels of row y that `out` keeps. Rows are asked for one after the other.
   void read(std::size_t y, FlipPicture& out) {
     for (; made_ < std::min(spans_.rows.size(), y + kFilterReach + 1); ++made_) make(made_);
-    const PixelSpans::Row& row = spans_.rows[y];
+    const FlipPicture::Row& row = out.rows[y];
     const std::size_t count = row.last - row.first;
     if (count == 0) return;
     for (auto& channel : opponent_) std::fill_n(channel.begin(), count, 0.f);
     for (const Eye& eye : eyes_) {
-      eye.rows.read(y, eye.term.kernel, part_.data());
+      eye.rows.read(y, row.first, row.last, eye.term.kernel, part_.data());
       std::vector<float>& to = opponent_[eye.channel];
       for (std::size_t i = 0; i < count; ++i) to[i] += eye.term.weight * part_[i];
     }
     find_lab(count, out.lab.data() + row.offset);
     for (std::size_t k = 0; k < 2; ++k) {
-      luma_[k + 1].read(y, feature_kernels().smooth, part_.data());
-      luma_[0].read(y, derivative(k), other_.data());
+      luma_[k + 1].read(y, row.first, row.last, feature_kernels().smooth, part_.data());
+      luma_[0].read(y, row.first, row.last, derivative(k), other_.data());
       for (std::size_t i = 0; i < count; ++i) out.detail[k][row.offset + i] = strength(part_[i], other_[i]);
     }
   }
@@ -182,11 +182,17 @@ class FlipFilter {
     const Vec3f* linear = picture_.linear.data() + y * picture_.side_px + row.first;
     float *const a = opponent_[0].data(), *const b = opponent_[1].data(), *const c = opponent_[2].data(),
                  *const luma = luma_row_.data();
-    for (std::size_t i = 0; i < row.last - row.first; ++i) {
-      const Channels of = channels_of(linear[i]);
+    const std::size_t count = row.last - row.first;
+    std::size_t first = 0, last = count;
+    while (first < count && linear[first] == picture_.linear[0]) ++first;
+    while (last > first && linear[last - 1] == picture_.linear[0]) --last;
+    const auto put = [&](std::size_t i, const Channels& of) {
       a[i] = of.opponent.x, b[i] = of.opponent.y, c[i] = of.opponent.z;
       luma[i] = of.luma;
-    }
+    };
+    for (std::size_t i = 0; i < first; ++i) put(i, plain_);
+    for (std::size_t i = first; i < last; ++i) put(i, channels_of(linear[i]));
+    for (std::size_t i = last; i < count; ++i) put(i, plain_);
     for (Eye& eye : eyes_) eye.rows.make(y, opponent_[eye.channel].data());
     for (FilteredRows& rows : luma_) rows.make(y, luma_row_.data());
   }
@@ -271,6 +277,34 @@ void for_each_flip(const FlipPicture& reference, const FlipPicture& test, auto&&
   }
 }
 
+/// Around the pixels of a row that either picture covers.
+FlipPicture::Row compared_columns(const FlipPicture& reference, const Picture& test, std::size_t y) {
+  const std::uint8_t* covered = test.covered.data() + y * test.side_px;
+  const FlipPicture::Row& other = reference.rows[y];
+  const auto shows = [&](std::uint32_t x) {
+    return covered[x] ||
+           (x >= other.first && x < other.last && reference.covered[other.offset + (x - other.first)]);
+  };
+  FlipPicture::Row row{0, test.side_px, 0};
+  while (row.first < row.last && !shows(row.first)) ++row.first;
+  while (row.last > row.first && !shows(row.last - 1)) --row.last;
+  return row;
+}
+
+/// The pixels whose rows are given.
+void filter_rows(const Picture& picture, const PixelSpans& spans, FlipPicture& out) {
+  const std::size_t count = out.rows.back().offset + (out.rows.back().last - out.rows.back().first);
+  out.lab.resize(count);
+  for (std::vector<float>& detail : out.detail) detail.resize(count);
+  for (std::size_t y = 0; y < out.rows.size(); ++y) {
+    const auto covered = picture.covered.begin() + static_cast<std::ptrdiff_t>(y * picture.side_px);
+    out.covered.insert(out.covered.end(), covered + out.rows[y].first, covered + out.rows[y].last);
+  }
+  FlipFilter filter(picture, spans);
+  for (std::size_t y = 0; y < out.rows.size(); ++y) filter.read(y, out);
+  filter.read_plain(out);
+}
+
 using Curve = SampledCurve<8192>;  // finer than 8-bit pictures can show
 
 const Curve& srgb_curve() {
@@ -300,7 +334,7 @@ class Windowed {
   const std::vector<float>& row(std::size_t y, auto&& values_of) {
     for (; made_ < std::min(spans_.rows.size(), y + window().size() / 2 + 1); ++made_)
       rows_.make(made_, values_of(made_));
-    rows_.read(y, window(), row_.data());
+    rows_.read(y, spans_.rows[y].first, spans_.rows[y].last, window(), row_.data());
     return row_;
   }
 
@@ -346,22 +380,12 @@ double FlipSum::percentile(double part) const {
   return 0;
 }
 
-FlipPicture prepare_flip(const Picture& picture) { return prepare_flip(picture, shown_spans(picture)); }
-
-FlipPicture prepare_flip(const Picture& picture, const PixelSpans& spans) {
+FlipPicture prepare_flip(const Picture& picture) {
   FlipPicture out;
   if (picture.linear.empty()) return out;
-  for (std::size_t y = 0; y < spans.rows.size(); ++y) {
-    const PixelSpans::Row& row = spans.rows[y];
-    out.rows.push_back({row.first, row.last, row.offset});
-    const auto covered = picture.covered.begin() + static_cast<std::ptrdiff_t>(y * picture.side_px);
-    out.covered.insert(out.covered.end(), covered + row.first, covered + row.last);
-  }
-  out.lab.resize(spans.count);
-  for (std::vector<float>& detail : out.detail) detail.resize(spans.count);
-  FlipFilter filter(picture, spans);
-  for (std::size_t y = 0; y < spans.rows.size(); ++y) filter.read(y, out);
-  filter.read_plain(out);
+  const PixelSpans spans = shown_spans(picture);
+  for (const PixelSpans::Row& row : spans.rows) out.rows.push_back({row.first, row.last, row.offset});
+  filter_rows(picture, spans, out);
   return out;
 }
 
@@ -374,6 +398,25 @@ FlipSum compare_flip(const FlipPicture& reference, const FlipPicture& test) {
     sum.sum += static_cast<double>(flip);
   });
   return sum;
+}
+
+FlipSum compare_flip(const FlipPicture& reference, const Picture& test, const PixelSpans& spans) {
+  FlipPicture filtered;
+  if (test.linear.empty()) return compare_flip(reference, filtered);
+  std::size_t count = 0;
+  for (std::size_t y = 0; y < spans.rows.size(); ++y) {
+    FlipPicture::Row row = compared_columns(reference, test, y);
+    row.first = std::max(row.first, spans.rows[y].first), row.last = std::min(row.last, spans.rows[y].last);
+    if (row.first >= row.last) row.first = row.last = 0;
+    row.offset = std::exchange(count, count + (row.last - row.first));
+    filtered.rows.push_back(row);
+  }
+  filter_rows(test, spans, filtered);
+  return compare_flip(reference, filtered);
+}
+
+FlipSum compare_flip(const FlipPicture& reference, const Picture& test) {
+  return compare_flip(reference, test, shown_spans(test));
 }
 
 std::vector<float> flip_map(const FlipPicture& reference, const FlipPicture& test) {

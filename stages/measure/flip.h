@@ -21,8 +21,6 @@ struct FlipPicture {
 };
 /// Costs by what the picture shows; the values are those of the whole picture.
 FlipPicture prepare_flip(const Picture& picture);
-/// `spans`: shown_spans() of the picture.
-FlipPicture prepare_flip(const Picture& picture, const PixelSpans& spans);
 
 inline constexpr int kFlipSteps = 1024;
 
@@ -43,6 +41,10 @@ struct FlipSum {
 /// degree: 0 = equal, 1 = black against white. Both parts, colours and features, as published; borders are
 /// replicated. Both pictures have one size. Same bits on every machine.
 FlipSum compare_flip(const FlipPicture& reference, const FlipPicture& test);
+/// The same bits, of a picture that is compared once: filtered where one of the two covers pixels. `spans`:
+/// shown_spans() of the picture.
+FlipSum compare_flip(const FlipPicture& reference, const Picture& test, const PixelSpans& spans);
+FlipSum compare_flip(const FlipPicture& reference, const Picture& test);
 /// The same of every pixel, row by row; 0 where neither picture shows the object.
 std::vector<float> flip_map(const FlipPicture& reference, const FlipPicture& test);
 /// Its mean.

@@ -173,15 +173,15 @@ void FilteredRows::make(std::size_t y, const float* values) {
   std::fill(out + row.last, out + row.first + whole_blocks(count), filtered_plain_);
 }
 
-void FilteredRows::read(std::size_t y, const FilterKernel& along_y, float* out) const {
-  const PixelSpans::Row& row = spans_.rows[y];
+void FilteredRows::read(std::size_t y, std::uint32_t first, std::uint32_t last, const FilterKernel& along_y,
+                        float* out) const {
   const std::size_t rows = spans_.rows.size(), radius = along_y.size() / 2;
   Lines taps{};
   for (std::size_t k = 0; k < along_y.size(); ++k) {
     const std::size_t at = std::min(std::max(y + k, radius) - radius, rows - 1);
-    taps[k] = line(at) + row.first;
+    taps[k] = line(at) + first;
   }
-  add_lines(along_y, taps.data(), row.last - row.first, out);
+  add_lines(along_y, taps.data(), last - first, out);
 }
 
 }  // namespace texmesh

@@ -71,9 +71,10 @@ class FilteredRows {
   float plain() const { return filtered_plain_; }
   /// Row y from `values` of its span. Rows are made in rising order; the last 2 kFilterReach + 1 stay.
   void make(std::size_t y, const float* values);
-  /// Writes row y's span, filtered along y. The rows within the kernel's reach must be made; borders are
-  /// replicated. `out` has room for whole_blocks(count).
-  void read(std::size_t y, const FilterKernel& along_y, float* out) const;
+  /// Writes columns first to last - 1 of row y, filtered along y. The rows within the kernel's reach must be
+  /// made; borders are replicated. `out` has room for whole_blocks(last - first).
+  void read(std::size_t y, std::uint32_t first, std::uint32_t last, const FilterKernel& along_y,
+            float* out) const;
 
  private:
   static constexpr std::size_t kKept = 2 * kFilterReach + 1;

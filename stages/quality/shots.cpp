@@ -152,7 +152,7 @@ PictureVariants SizePictures::pictures(std::size_t scale, const PictureView& at,
 
 Loss SizePictures::compare(const Reference& reference, const Picture& test) const {
   const PixelSpans spans = shown_spans(test);
-  Loss loss{compare_flip(reference.flip, prepare_flip(test, spans)), 0};
+  Loss loss{compare_flip(reference.flip, test, spans), 0};
   if (with_ssim_) {
     const PictureDifference d = compare_luma(reference.luma, prepare_luma(test, spans));
     loss.dssim = static_cast<double>(d.pixels) - d.ssim;

@@ -212,6 +212,7 @@ Vec3f diffuse_light(const RenderEnvironment& environment, Vec3f normal) {
 }
 
 Vec3f specular_light(const RenderEnvironment& environment, Vec3f direction, float roughness) {
+  if (environment.levels.empty()) return {};
   const float at = saturated(roughness) * static_cast<float>(environment.levels.size() - 1);
   const auto sharp = std::min(static_cast<std::size_t>(at), environment.levels.size() - 2);
   const Vec2f place = octahedral(direction);
@@ -237,11 +238,10 @@ RenderEnvironment daylight_environment(Vec3f x, Vec3f y, Vec3f z, bool metallic)
   const std::array<float, kHarmonics> basis = harmonics_of(Vec3f{0, 1, 0});
   out.irradiance[0] = padded((kPaperAbove + kPaperBelow) * (0.5f / basis[0]));
   out.irradiance[1] = padded((kPaperAbove - kPaperBelow) * (0.5f / basis[1]));
-  for (std::uint32_t i = 0; i < kSkyLevels; ++i) {
+  for (std::uint32_t i = 0; metallic && i < kSkyLevels; ++i) {
     const float roughness = static_cast<float>(i) / (kSkyLevels - 1);
-    out.levels.push_back(make_level(kSkySide, {}, [&](Vec3f direction) {
-      return metallic ? sky_radiance(direction.y, roughness) : Vec3f{0, 0, 0};
-    }));
+    out.levels.push_back(
+        make_level(kSkySide, {}, [&](Vec3f direction) { return sky_radiance(direction.y, roughness); }));
   }
   out.key = {normalized(x * kLampPlace.x + y * kLampPlace.y + z * kLampPlace.z),
              Vec3f{kLampIntensity, kLampIntensity, kLampIntensity}};

@@ -18,7 +18,8 @@ struct RenderEnvironment {
   static constexpr std::size_t kHarmonics = 25;  // of the bands 0 to 4
   /// Colours are padded with a 0, so that processors take all channels at once.
   std::array<Vec4f, kHarmonics> irradiance;  // spherical harmonics of irradiance / pi
-  /// Prefiltered radiance as octahedral maps with a border of one texel, roughness i / (size - 1).
+  /// Prefiltered radiance as octahedral maps with a border of one texel, roughness i / (size - 1). At least
+  /// two, or none where nothing shines.
   struct Level {
     std::uint32_t side = 0;     // texels with the border
     std::vector<Vec4f> texels;  // side x side

@@ -383,9 +383,9 @@ void FragmentShader::colours_of(std::uint32_t pixel, const RenderFragment& fragm
                                 std::span<FragmentColour> out) const {
   const RenderMaterial& material = scene_.material_of(fragment.triangle);
   const Prepared& prepared = materials_[static_cast<std::size_t>(&material - scene_.materials->data())];
-  if (scratch.triangle != fragment.triangle) scratch.in_view = triangle_in_view(fragment.triangle);
-  scratch.triangle = fragment.triangle;
-  const FragmentPlace place = place_of(pixel, fragment, scratch.in_view);
+  Scratch::Seen& seen = scratch.triangles[fragment.triangle % Scratch::kTriangles];
+  if (seen.index != fragment.triangle) seen = {fragment.triangle, triangle_in_view(fragment.triangle)};
+  const FragmentPlace place = place_of(pixel, fragment, seen.in_view);
   Fragment here(*this, prepared, place, fragment.back != 0, scratch);
   if (out.size() > 1) here.prefetch(prepared.variants[0]);
   for (std::size_t v = 0; v < out.size(); ++v) {
@@ -416,10 +416,12 @@ Lighting lighting_of(const LitSurface& s, Vec3f to_viewer, const RenderEnvironme
   out.n_dot_v = saturated(cosine);
   out.split = split_sum(s.roughness, out.n_dot_v);
   out.diffuse = same_normal ? same_normal->diffuse : diffuse_light(environment, s.normal);
-  // A rough lobe's mean direction leans towards the normal.
-  const Vec3f mirror = s.normal * (2 * cosine) - to_viewer;
-  const Vec3f direction = normalized(mixed(mirror, s.normal, s.roughness * s.roughness));
-  out.glossy = specular_light(environment, direction, s.roughness);
+  if (!environment.levels.empty()) {
+    // A rough lobe's mean direction leans towards the normal.
+    const Vec3f mirror = s.normal * (2 * cosine) - to_viewer;
+    const Vec3f direction = normalized(mixed(mirror, s.normal, s.roughness * s.roughness));
+    out.glossy = specular_light(environment, direction, s.roughness);
+  }
   out.occlusion = s.occlusion;
   out.occluded = specular_occlusion(out.n_dot_v, s.occlusion, s.roughness);
   return out;

@@ -108,9 +108,14 @@ class FragmentShader {
   /// Memory of one thread.
   struct Scratch {
     std::vector<TextureSite> sites;
-    std::vector<std::uint8_t> known;        // per site
-    std::optional<std::uint32_t> triangle;  // of the last fragment, which mostly is the next one's, too
-    TriangleInView in_view;
+    std::vector<std::uint8_t> known;  // per site
+    /// By index modulo kTriangles: a triangle comes back in the next row of pixels.
+    static constexpr std::size_t kTriangles = 64;
+    struct Seen {
+      std::uint32_t index = kNoIndex;
+      TriangleInView in_view;
+    };
+    std::vector<Seen> triangles = std::vector<Seen>(kTriangles);
   };
   /// One colour per variant.
   void colours_of(std::uint32_t pixel, const RenderFragment& fragment, Scratch& scratch,

@@ -117,7 +117,7 @@ FlipSum picture_loss(const ReferenceViews& reference, const RenderScene& scene,
     if (2 * v >= all.size() && sum.mean() > hopeless) break;
     const Picture picture =
         shade(scene, all[v].seen(scene, context), textures, reference.environment, context);
-    sum.add(compare_flip(all[v].picture, prepare_flip(picture)));
+    sum.add(compare_flip(all[v].picture, picture));
   }
   return sum;
 }

@@ -148,7 +148,7 @@ std::vector<Local> nearest_parts(const JoinedParts& wrap, std::span<const Vec3d>
       if (at.weight[k] > 0) half += at.weight[k] * thickness[wrap.soup.triangles[at.triangle][k]];
     local[p].part = wrap.part[at.triangle];
     local[p].half = std::max(half - offset, 0.0);
-    local[p].weight = std::clamp(local[p].half / offset - 0.5, 0.0, 1.0);
+    local[p].weight = offset > 0 ? std::clamp(local[p].half / offset - 0.5, 0.0, 1.0) : 1;
   });
   return local;
 }

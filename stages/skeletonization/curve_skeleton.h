@@ -60,7 +60,7 @@ class SegmentTree {
 struct LocalRadiusOptions {
   double plate_ratio = 5;  // a part whose median skeleton distance / half thickness is above it is a plate
   double limb_ratio = 3;   // elsewhere R is at most this many half thicknesses
-  double offset = 0;       // how far the wrap stands off the shape
+  double offset = 0;       // how far the wrap stands off the shape; 0: it is the shape, none of it a sheet
 };
 
 struct LocalRadius {

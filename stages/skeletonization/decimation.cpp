@@ -6,6 +6,8 @@
 #include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
 #include <CGAL/Surface_mesh.h>
 #include <CGAL/Surface_mesh_simplification/Policies/Edge_collapse/Count_stop_predicate.h>
+#include <CGAL/Surface_mesh_simplification/Policies/Edge_collapse/Edge_length_cost.h>
+#include <CGAL/Surface_mesh_simplification/Policies/Edge_collapse/Midpoint_placement.h>
 #include <CGAL/Surface_mesh_simplification/edge_collapse.h>
 #include <CGAL/Uncertain.h>
 #include <CGAL/exceptions.h>
@@ -13,6 +15,7 @@
 namespace texmesh {
 namespace {
 
+namespace simplification = CGAL::Surface_mesh_simplification;
 using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
 using SurfaceMesh = CGAL::Surface_mesh<Kernel::Point_3>;
 
@@ -38,6 +41,18 @@ TriangleSoup triangle_soup(const SurfaceMesh& mesh) {
   return soup;
 }
 
+/// `collapse` takes edges out of a mesh until a predicate stops it.
+TriangleSoup collapsed(TriangleSoup closed, std::size_t max_faces, auto&& collapse) {
+  if (closed.triangles.size() <= max_faces) return closed;
+  return with_cgal_checks([&] {
+    SurfaceMesh mesh = surface_mesh(closed);
+    // A closed triangle mesh has three edges for two faces.
+    collapse(mesh, simplification::Count_stop_predicate<SurfaceMesh>(max_faces * 3 / 2));
+    mesh.collect_garbage();
+    return triangle_soup(mesh);
+  });
+}
+
 }  // namespace
 
 void rethrow_cgal_failure() {
@@ -51,14 +66,15 @@ void rethrow_cgal_failure() {
 }
 
 TriangleSoup decimate(TriangleSoup closed, std::size_t max_faces) {
-  if (closed.triangles.size() <= max_faces) return closed;
-  return with_cgal_checks([&] {
-    SurfaceMesh mesh = surface_mesh(closed);
-    // A closed triangle mesh has three edges for two faces.
-    CGAL::Surface_mesh_simplification::Count_stop_predicate<SurfaceMesh> stop(max_faces * 3 / 2);
-    CGAL::Surface_mesh_simplification::edge_collapse(mesh, stop);
-    mesh.collect_garbage();
-    return triangle_soup(mesh);
+  return collapsed(std::move(closed), max_faces,
+                   [](SurfaceMesh& mesh, const auto& stop) { simplification::edge_collapse(mesh, stop); });
+}
+
+TriangleSoup decimate_evenly(TriangleSoup closed, std::size_t max_faces) {
+  return collapsed(std::move(closed), max_faces, [](SurfaceMesh& mesh, const auto& stop) {
+    simplification::edge_collapse(mesh, stop,
+                                  CGAL::parameters::get_cost(simplification::Edge_length_cost<SurfaceMesh>())
+                                      .get_placement(simplification::Midpoint_placement<SurfaceMesh>()));
   });
 }
 

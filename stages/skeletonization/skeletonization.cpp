@@ -58,6 +58,7 @@ CurveSkeleton contract_parts(const std::vector<TriangleSoup>& parts, int max_con
 struct WrapSize {
   double alpha = 0;
   std::size_t faces = 0;
+  bool is_coarsest = false;
 };
 /// A mesh of 6,400 triangles has edges of about alpha, and a wrap of shorter ones shows no more of it.
 /// Smaller models come in thousands, so below that the wrap gets coarser faster than the mesh.
@@ -69,22 +70,48 @@ WrapSize wrap_size(const SkeletonizationOptions& options, std::size_t triangles)
   const double faces = std::min<double>(options.max_wrap_faces, count * count * count / kCubeOfOneFace);
   return {1 / std::min<double>(options.alpha_divisor, divisor),
           std::max(std::min<std::size_t>(kLeastFaces, static_cast<std::size_t>(options.max_wrap_faces)),
-                   static_cast<std::size_t>(faces))};
+                   static_cast<std::size_t>(faces)),
+          divisor == kLeastDivisor};
+}
+
+/// The closed surface that is contracted, and what it is contracted to.
+struct ContractedSurface {
+  std::vector<TriangleSoup> parts;
+  CurveSkeleton skeleton;
+  double offset = 0;  // how far it stands off the shape
+};
+
+/// Of the mesh itself, where that is a closed surface of few but small triangles; else nothing. R comes
+/// nearer to that of a fine wrap than R of the coarsest one: over six scans and six made models of 1,200 to
+/// 2,400 triangles it differs by 2 to 47 %, mean 17, that of the coarsest wrap by 3 to 107, mean 26.
+ContractedSurface contract_mesh(const TriangleSoup& soup, const WrapSize& size,
+                                const SkeletonizationOptions& options) {
+  constexpr std::size_t kLeastTriangles = 1000;
+  constexpr double kLongestEdge = 0.25;
+  ContractedSurface out;
+  if (!size.is_coarsest || soup.triangles.size() < kLeastTriangles || !is_closed_surface(soup, kLongestEdge))
+    return out;
+  try_geometry(
+      [&] {
+        out.parts = {decimate_evenly(soup, size.faces)};
+        out.skeleton = contract_to_skeleton(out.parts.front(), options.max_contractions);
+      },
+      [&] { out = {}; });
+  return is_finite(out.skeleton) ? out : ContractedSurface{};
 }
 
 /// The wrap at the finest alpha at which it ends within the cap.
-std::vector<TriangleSoup> wrap(const TriangleSoup& soup, std::size_t triangles,
+std::vector<TriangleSoup> wrap(const TriangleSoup& soup, const WrapSize& size,
                                const SkeletonizationOptions& options, Notes& notes,
                                const RunContext& context) {
-  const auto [finest_alpha, faces] = wrap_size(options, triangles);
   const auto divisor = [](double of) { return std::to_string(std::lround(1 / of)); };
-  double alpha = finest_alpha;
+  double alpha = size.alpha;
   for (int attempt = 1;; ++attempt, alpha *= 2) {
     context.check_cancelled();
     std::vector<TriangleSoup> parts;
     try_geometry(
         [&] {
-          parts = wrap_surface(soup, alpha, 1.0 / options.offset_divisor, faces,
+          parts = wrap_surface(soup, alpha, 1.0 / options.offset_divisor, size.faces,
                                static_cast<std::size_t>(options.max_wrap_steps), context);
         },
         [&] {
@@ -94,7 +121,7 @@ std::vector<TriangleSoup> wrap(const TriangleSoup& soup, std::size_t triangles,
     if (parts.empty()) continue;
     if (attempt > 1)
       add_warning(notes, "skeleton-coarser-wrap", "",
-                  "the surface is too intricate for alpha_divisor " + divisor(finest_alpha) +
+                  "the surface is too intricate for alpha_divisor " + divisor(size.alpha) +
                       ", wrapped with " + divisor(alpha));
     return parts;
   }
@@ -126,16 +153,21 @@ CurveSkeleton extract(const ConditionedMesh& mesh, const UnitFrame& frame,
                       const SkeletonizationOptions& options, const RunContext& context,
                       std::vector<float>& distance, Notes& notes) {
   const TriangleSoup soup = make_wrap_soup(mesh, frame);
-  const std::vector<TriangleSoup> parts = wrap(soup, mesh.mesh.triangles.size(), options, notes, context);
-  context.report(0.7);
-  CurveSkeleton skeleton = contract_parts(parts, options.max_contractions, notes, context);
+  const WrapSize size = wrap_size(options, mesh.mesh.triangles.size());
+  auto [parts, skeleton, offset] = contract_mesh(soup, size, options);
+  if (parts.empty()) {
+    parts = wrap(soup, size, options, notes, context);
+    context.report(0.7);
+    skeleton = contract_parts(parts, options.max_contractions, notes, context);
+    offset = 1.0 / options.offset_divisor;
+  }
   context.report(0.8);
   std::vector<Vec3d> points;
   points.reserve(mesh.mesh.positions.size());
   for (Vec3f p : mesh.mesh.positions) points.push_back(frame.to_unit(p));
   const std::vector<double> far = distances_to(skeleton, points, context);
-  const LocalRadius local = limit_by_thickness(
-      parts, points, far, {options.plate_ratio, options.limb_ratio, 1.0 / options.offset_divisor}, context);
+  const LocalRadius local =
+      limit_by_thickness(parts, points, far, {options.plate_ratio, options.limb_ratio, offset}, context);
   note_limits(local, notes);
   for (double r : local.radius) distance.push_back(static_cast<float>(r * frame.diagonal));
   for (Vec3d& p : skeleton.nodes) p = frame.from_unit(p);

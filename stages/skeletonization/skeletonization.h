@@ -5,7 +5,7 @@
 
 namespace texmesh {
 
-inline constexpr int kSkeletonizationVersion = 8;
+inline constexpr int kSkeletonizationVersion = 9;
 
 struct SkeletonizationOptions {
   // At 40 a turtle has no hind legs, at 60 the skeleton of a saxophone's neck cuts its corner.
@@ -41,8 +41,9 @@ struct SkeletonizationOptions {
 /// curvature flow skeleton, and distances to it that the local thickness corrects where a curve is no
 /// skeleton (local_radius.h). Meshes of more than 100,000 triangles are clustered to that first. Of few
 /// triangles n alpha_divisor is at most 80 (n / 6400)^1.5, or 24 (the default is whole from 6,400 on), and
-/// the wrap has at most n^3 / 8,000,000 faces, or 1,000. No mesh makes it fail. Every fallback
-/// gives a warning:
+/// the wrap has at most n^3 / 8,000,000 faces, or 1,000. Where it would be the coarsest and the mesh is one
+/// closed surface of at least 1,000 triangles, none with an edge of more than a quarter of the diagonal, the
+/// mesh itself is contracted. No mesh makes it fail. Every fallback gives a warning:
 /// - "skeleton-coarser-wrap": a wrap that takes more than max_wrap_steps, or looks at 50 times as many
 ///   triangles (thousands of needles around one point), is tried with twice and four times its alpha.
 /// - "skeleton-part-centroid": a part of the wrap that cannot be contracted has its centroid for a skeleton.

@@ -152,6 +152,28 @@ TriangleSoup make_wrap_soup(const ConditionedMesh& mesh, const UnitFrame& frame)
   return soup;
 }
 
+bool is_closed_surface(const TriangleSoup& soup, double longest) {
+  DisjointSets sets(soup.points.size());
+  std::vector<std::uint64_t> there, back;  // along each edge
+  double volume = 0;
+  for (const Triangle& t : soup.triangles) {
+    volume += dot(soup.points[t[0]], cross(soup.points[t[1]], soup.points[t[2]]));
+    for (std::size_t k = 0; k < 3; ++k) {
+      const std::uint64_t a = t[k], b = t[(k + 1) % 3];
+      if (!(length(soup.points[a] - soup.points[b]) <= longest)) return false;
+      sets.join(t[0], t[k]);
+      there.push_back(a << 32 | b);
+      back.push_back(b << 32 | a);
+    }
+  }
+  std::sort(there.begin(), there.end());
+  std::sort(back.begin(), back.end());
+  if (there != back || std::ranges::adjacent_find(there) != there.end() || !(volume > 0)) return false;
+  for (std::uint32_t p = 0; p < soup.points.size(); ++p)
+    if (sets.find(p) != sets.find(0)) return false;
+  return true;
+}
+
 std::vector<TriangleSoup> wrap_surface(const TriangleSoup& soup, double alpha, double offset,
                                        std::size_t max_faces, std::size_t max_steps,
                                        const RunContext& context) {

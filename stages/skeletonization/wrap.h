@@ -1,5 +1,5 @@
 #pragma once
-// Inside the room only: the closed surface around a mesh that is contracted to the skeleton.
+// Inside the room only: the closed surface, of a mesh or around it, that is contracted to the skeleton.
 #include <exception>
 
 #include "stages/base/run_context.h"
@@ -67,6 +67,10 @@ TriangleSoup alpha_wrap(const TriangleSoup& soup, double alpha, double offset, s
 /// Deterministic, single-threaded.
 TriangleSoup decimate(TriangleSoup closed, std::size_t max_faces);
 
+/// The same by the shortest edges, each to its middle: no triangle gets long, as decimate() makes them along
+/// cylinders, whose contraction then misses the middle.
+TriangleSoup decimate_evenly(TriangleSoup closed, std::size_t max_faces);
+
 /// The frame in which wrap and contraction work: centred, diagonal 1.
 struct UnitFrame {
   Vec3d centre;
@@ -82,5 +86,10 @@ UnitFrame unit_frame_of(const std::vector<Vec3f>& positions);
 /// is open at its base is wrapped as a solid, not as a bowl; a sheet stays a sheet. GeometryFailure when no
 /// triangle has an area. Deterministic.
 TriangleSoup make_wrap_soup(const ConditionedMesh& mesh, const UnitFrame& frame);
+
+/// Whether a soup is one connected closed surface around a solid: each edge has two triangles, which run
+/// against each other along it, their normals look outwards, and no edge is longer than `longest`. Parts of
+/// it may still lie in each other.
+bool is_closed_surface(const TriangleSoup& soup, double longest);
 
 }  // namespace texmesh

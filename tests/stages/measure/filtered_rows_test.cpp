@@ -51,7 +51,7 @@ TEST(FilteredRows, AreThoseOfTheWholePictureToTheBit) {
         for (std::uint32_t j = 0; j < 70; ++j) {
           for (; made < std::min<std::size_t>(70, j + kFilterReach + 1); ++made)
             rows.make(made, values_of(picture, spans, made).data());
-          rows.read(j, *y, got.data());
+          rows.read(j, spans.rows[j].first, spans.rows[j].last, *y, got.data());
           for (std::uint32_t i = spans.rows[j].first; i < spans.rows[j].last; ++i)
             ASSERT_EQ(got[i - spans.rows[j].first],
                       by_definition(picture, static_cast<int>(i), static_cast<int>(j), *x, *y))

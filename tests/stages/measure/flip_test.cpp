@@ -36,6 +36,20 @@ TEST(Flip, PlaceAndSizeOfThePictureDoNotMatter) {
   EXPECT_NEAR(here, compare(striped(240, 71, 0.5f), striped(240, 71, 0.4f)).mean(), 1e-6);
 }
 
+TEST(Flip, APictureThatIsComparedOnceIsFilteredWhereItMatters) {
+  Picture empty = striped(100, 20, 0.2f);
+  empty.linear.assign(empty.linear.size(), {0.2f, 0.2f, 0.2f});
+  empty.covered.assign(empty.covered.size(), 0);
+  const std::vector<Picture> pictures{striped(100, 5, 0.5f), striped(100, 9, 0.4f), striped(100, 60, 0.5f),
+                                      striped(100, 80, 0.9f), empty};
+  for (const Picture& a : pictures)
+    for (const Picture& b : pictures) {
+      const FlipSum once = compare_flip(prepare_flip(a), b), whole = compare(a, b);
+      EXPECT_EQ(once.sum, whole.sum);
+      EXPECT_EQ(once.histogram, whole.histogram);
+    }
+}
+
 TEST(Flip, PercentilesAreOfAllPicturesTogether) {
   FlipSum sum = compare(striped(100, 40, 0.5f), striped(100, 40, 0.4f));
   const double alone = sum.percentile(0.95), mean = sum.mean();

@@ -245,8 +245,21 @@ TEST(Skeletonization, WhatCgalWouldNotEndOnIsGivenUp) {
   EXPECT_THROW(contract_to_skeleton(soup), std::exception);
 }
 
+TEST(Skeletonization, AClosedSurfaceOfFewTrianglesIsContractedWithoutAWrap) {
+  const SkeletonizationOptions no_wrap{.max_wrap_steps = 1000};
+  for (const float radius : {0.3f, 0.5f, 0.8f}) {
+    const Mesh m = cylinder(radius, 6, 30, 30);
+    const Skeleton s = run(m, no_wrap);
+    expect_sound(s, m.positions.size());
+    EXPECT_TRUE(s.notes.empty());
+    const RadiusError e =
+        radius_error(m, s, radius, [&](Vec3f p) { return std::fabs(p.x) < 3 - 1.5f * radius; });
+    EXPECT_LT(e.largest, 0.1) << radius;  // 1.9 where triangles get long along it
+  }
+}
+
 TEST(Skeletonization, WorkCapsFallBackStepByStep) {
-  const Mesh m = testing::bumpy_sphere(24, 36, 0.1f);
+  const Mesh m = testing::side_by_side({testing::bumpy_sphere(24, 36, 0.1f), testing::cube()}, 1);  // wrapped
   const auto codes = [](const Skeleton& s) {
     std::vector<std::string> list;
     for (const Note& n : s.notes)

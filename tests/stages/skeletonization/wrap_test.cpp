@@ -49,13 +49,29 @@ TEST(WrapSurface, GivesUpAfterItsSteps) {
   EXPECT_THROW(wrap_surface(balls({{0, 0, 0}}), 0.1, 0.01, 500, 50, RunContext()), GeometryFailure);
 }
 
+TEST(IsClosedSurface, OfOneConnectedSolidWithNoLongEdges) {
+  const TriangleSoup ball = balls({{0, 0, 0}});
+  EXPECT_TRUE(is_closed_surface(ball, 0.5));
+  EXPECT_FALSE(is_closed_surface(ball, 0.01));
+  EXPECT_FALSE(is_closed_surface(balls({{0, 0, 0}, {5, 0, 0}}), 0.5));
+  TriangleSoup open = ball, inside_out = ball, turned = ball, twice = ball;
+  open.triangles.pop_back();
+  for (Triangle& t : inside_out.triangles) std::swap(t[0], t[1]);
+  std::swap(turned.triangles[0][0], turned.triangles[0][1]);
+  twice.triangles.insert(twice.triangles.end(), ball.triangles.begin(), ball.triangles.end());
+  for (const TriangleSoup& other : {open, inside_out, turned, twice})
+    EXPECT_FALSE(is_closed_surface(other, 0.5));
+}
+
 TEST(Decimate, StaysClosedWithFewerFaces) {
   const TriangleSoup ball = balls({{0, 0, 0}});
   EXPECT_EQ(decimate(ball, ball.triangles.size()).triangles, ball.triangles);
-  const TriangleSoup fewer = decimate(ball, 100);
-  EXPECT_TRUE(is_closed(fewer));
-  EXPECT_LE(fewer.triangles.size(), 100u);
-  EXPECT_GE(fewer.triangles.size(), 90u);
+  for (const auto thin_out : {decimate, decimate_evenly}) {
+    const TriangleSoup fewer = thin_out(ball, 100);
+    EXPECT_TRUE(is_closed(fewer));
+    EXPECT_LE(fewer.triangles.size(), 100u);
+    EXPECT_GE(fewer.triangles.size(), 90u);
+  }
 }
 
 }  // namespace texmesh::wrap_test

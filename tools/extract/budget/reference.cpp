@@ -201,7 +201,7 @@ double LitMeter::part(std::size_t view, const LitViews& views, std::size_t made,
                       const std::vector<RenderTexture>& textures, const RunContext& context) const {
   Picture picture = views.picture(made, textures, environment_, context);
   views.camera(made).cut(picture);
-  return weights_[view] * flip_of(reference_[view], prepare_flip(picture));
+  return weights_[view] * compare_flip(reference_[view], picture).mean();
 }
 
 std::vector<double> LitMeter::differences(const LitViews& views, const std::vector<RenderTexture>& textures,
@@ -231,7 +231,7 @@ std::vector<double> LitMeter::differences(const LitViews& views, const std::vect
     if (seen.empty()) continue;
     const PictureVariants pictures = views.pictures(v, lists, all, environment_, context);
     parallel_each(context, seen.size(), 1, [&](std::size_t k) {
-      sums[seen[k]] += weights_[v] * flip_of(reference_[v], prepare_flip(pictures.picture(k + 1)));
+      sums[seen[k]] += weights_[v] * compare_flip(reference_[v], pictures.picture(k + 1)).mean();
     });
   }
   return sums;
