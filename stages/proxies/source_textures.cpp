@@ -204,12 +204,13 @@ class GroupPictures {
   std::vector<Visibility> seen_;
 };
 
-/// Sizes whose files may fit, from the largest on by halves, each in three qualities.
+/// Sizes whose files may fit, from the largest on by halves. Qualities between them follow from those that are
+/// looked at, so the two sizes that most files take have most of them.
 std::vector<TexturePlan> plans_of(const SourceTextures& textures, const SourceTextures::Group& group,
                                   double most_bytes) {
   constexpr double kMostTexelsPerByte = 4;
-  constexpr std::size_t kMostSizes = 4;
-  constexpr std::array<int, 3> kQualities{30, 60, 85};
+  const std::array<std::vector<int>, 4> qualities{{{60, 85}, {30, 60, 85}, {60}, {60}}};  // by size
+  constexpr int kQualityOfTheSmallest = 85;
   std::vector<TexturePlan> out;
   int steps = 0;
   while (textures.side_px(group, steps) > kLeastSide &&
@@ -217,10 +218,10 @@ std::vector<TexturePlan> plans_of(const SourceTextures& textures, const SourceTe
           textures.texels(group, steps) > kMostTexelsPerByte * most_bytes))
     ++steps;
   const auto last_side = [&](int s) { return textures.side_px(group, s) <= kLeastSide; };
-  for (std::size_t i = 0; i < kMostSizes && !last_side(steps); ++i, steps += 2)
-    for (const int quality : kQualities) out.push_back({steps, quality});
+  for (std::size_t i = 0; i < qualities.size() && !last_side(steps); ++i, steps += 2)
+    for (const int quality : qualities[i]) out.push_back({steps, quality});
   while (!last_side(steps)) ++steps;
-  out.push_back({steps, kQualities.back()});
+  out.push_back({steps, kQualityOfTheSmallest});
   return out;
 }
 
