@@ -204,8 +204,8 @@ class GroupPictures {
   std::vector<Visibility> seen_;
 };
 
-/// Sizes whose files may fit, from the largest on by halves. Qualities between them follow from those that are
-/// looked at, so the two sizes that most files take have most of them.
+/// Sizes whose files may fit, from the largest on by halves. Qualities between them follow from those that
+/// are looked at, so the two sizes that most files take have most of them.
 std::vector<TexturePlan> plans_of(const SourceTextures& textures, const SourceTextures::Group& group,
                                   double most_bytes) {
   constexpr double kMostTexelsPerByte = 4;
