@@ -6,7 +6,7 @@
 
 #include <map>
 
-#include "format/base/errors.h"
+#include "pipeline/io/resolver.h"
 #include "tests/support/command.h"
 
 namespace texmesh::find_models_test {
@@ -44,7 +44,7 @@ TEST(FindModels, AFolderThatCannotBeListedIsAnError) {
   fs::create_directories(folder / "closed");
   write_text(folder / "a.glb", "x");
   ::chmod((folder / "closed").c_str(), 0);
-  EXPECT_THROW(list_models(folder.path().string()), Error);
+  EXPECT_THROW(list_models(folder.path().string()), RightsError);
   ::chmod((folder / "closed").c_str(), 0700);
 }
 

@@ -43,4 +43,12 @@ TEST(ToldErrors, EachKindHasItsCodeAndSaysWhatItFound) {
   EXPECT_NE(internal.text.find("internal error: two and two"), std::string::npos);
 }
 
+TEST(ToldErrors, MissingRightsAreNoUsageError) {
+  const auto asked = [](const auto& error) { return [&error]() -> int { throw error; }; };
+  const RightsError rights("scans", "", "", "cannot be listed");
+  const InputError name("scans", "", "", "cannot be listed");
+  EXPECT_EQ(told_of([&] { return as_usage(asked(rights)); }).exit_code, kExitModelFailed);
+  EXPECT_EQ(told_of([&] { return as_usage(asked(name)); }).exit_code, kExitUsage);
+}
+
 }  // namespace texmesh::told_errors_test
