@@ -257,9 +257,7 @@ class JpegCodec : public TextureCodec {
         MaskedJpeg(kind_of(alike)).count_symbols(part[w], all.subspan(alike), into.subspan(alike));
     });
     for (const auto& window : counts)
-      for (std::size_t r = 0; r < window.size(); ++r)
-        for (std::size_t k = 0; k < window[r].size(); ++k)
-          for (std::size_t s = 0; s < window[r][k].size(); ++s) training[r].counts[k][s] += window[r][k][s];
+      for (std::size_t r = 0; r < window.size(); ++r) add_counts(training[r].counts, window[r]);
   }
 
   class Encoder : public FragmentEncoder {

@@ -27,6 +27,11 @@ using HuffmanTables = std::vector<HuffmanTable>;
 
 /// How often each symbol of those tables was coded.
 using SymbolCounts = std::vector<std::array<std::uint64_t, 256>>;
+/// Adds those of other streams, of as many tables.
+void add_counts(auto& to, const auto& from) {
+  for (std::size_t t = 0; t < from.size(); ++t)
+    for (std::size_t s = 0; s < from[t].size(); ++s) to[t][s] += from[t][s];
+}
 
 /// A table in which every one of `symbols` has a code of at most 16 bits, made from `weights` (same length,
 /// all > 0) as ISO 10918-1 annex K.2 does: no code consists of ones only. Ties by the symbol's value, the

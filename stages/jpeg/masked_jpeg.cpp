@@ -252,9 +252,7 @@ std::vector<double> bits_of_windows(
     std::vector<TableCounts> part(sets);
     for (std::size_t w = begin; w < end; ++w) count(windows[w], part);
     const std::lock_guard lock(mutex);  // sums of whole numbers: in any order
-    for (std::size_t q = 0; q < part.size(); ++q)
-      for (std::size_t t = 0; t < part[q].size(); ++t)
-        for (std::size_t s = 0; s < part[q][t].size(); ++s) counts[q][t][s] += part[q][t][s];
+    for (std::size_t q = 0; q < part.size(); ++q) add_counts(counts[q], part[q]);
   });
   std::vector<double> out;
   for (const TableCounts& tables : counts) {

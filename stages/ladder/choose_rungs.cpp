@@ -7,6 +7,7 @@
 #include "stages/base/parallel.h"
 #include "stages/fragment_codec/fragment_codec.h"
 #include "stages/image/jpeg_segments.h"
+#include "stages/ladder/encode_rungs.h"
 #include "stages/measure/fragment_meter.h"
 
 namespace texmesh {
@@ -48,9 +49,7 @@ Window window_in(const TexturePlane& plane, std::size_t fragment, std::uint32_t 
 
 /// In covered fragments evenly spread in index order.
 std::vector<Window> sample_windows(const TexturePlane& plane) {
-  std::vector<std::size_t> covered;
-  for (std::size_t f = 0; f < plane.covered_texels.size(); ++f)
-    if (plane.covered_texels[f] > 0) covered.push_back(f);
+  const std::vector<std::size_t> covered = covered_fragments(plane);
   const std::size_t count = std::min(kWindows, covered.size());
   std::vector<Window> out;
   for (std::size_t k = 0; k < count; ++k) {

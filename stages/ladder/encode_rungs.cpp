@@ -17,13 +17,6 @@ namespace {
 /// more time.
 constexpr std::uint64_t kSampleDivisor = 16, kLeastSamplePixels = 131072, kLeastTrainingPixels = 32768;
 
-std::vector<std::size_t> covered_fragments(const TexturePlane& plane) {
-  std::vector<std::size_t> out;
-  for (std::size_t f = 0; f < plane.covered_texels.size(); ++f)
-    if (plane.covered_texels[f] > 0) out.push_back(f);
-  return out;
-}
-
 /// The part of the window at (left, top).
 PixelWindow part_of(PixelWindow window, std::uint32_t channels, const TexelRectangle& part) {
   window.data += part.top_px * window.stride_bytes + std::size_t{part.left_px} * channels;
@@ -225,9 +218,7 @@ std::optional<std::vector<SymbolCounts>> count_all(const SourcePlane& source,
   if (std::ranges::count(fits, 0) > 0) return std::nullopt;
   std::vector<SymbolCounts> sum(rungs.size(), SymbolCounts(tables));
   for (const auto& window : counted)
-    for (std::size_t r = 0; r < window.size(); ++r)
-      for (std::size_t t = 0; t < tables; ++t)
-        for (std::size_t s = 0; s < sum[r][t].size(); ++s) sum[r][t][s] += window[r][t][s];
+    for (std::size_t r = 0; r < window.size(); ++r) add_counts(sum[r], window[r]);
   return sum;
 }
 
@@ -372,6 +363,13 @@ std::vector<int> asked_qualities(TextureRole role, const LadderOptions& options)
 }
 
 }  // namespace
+
+std::vector<std::size_t> covered_fragments(const TexturePlane& plane) {
+  std::vector<std::size_t> out;
+  for (std::size_t f = 0; f < plane.covered_texels.size(); ++f)
+    if (plane.covered_texels[f] > 0) out.push_back(f);
+  return out;
+}
 
 PixelWindow fragment_window(const TexturePlane& plane, const Pixels& pixels, Uncovered uncovered,
                             std::size_t fragment) {

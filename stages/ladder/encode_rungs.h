@@ -33,6 +33,8 @@ struct SourceCodec {
 SourceCodec make_source_codec(const TexturePlane& plane, const Pixels& pixels, const Image& image,
                               const LadderOptions& options, const RunContext& context);
 
+std::vector<std::size_t> covered_fragments(const TexturePlane& plane);
+
 /// Heights of windows in samples are multiples of this.
 inline constexpr std::uint32_t kSampleRows = 16;
 
