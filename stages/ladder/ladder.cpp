@@ -137,8 +137,8 @@ Codec codec_of(const TexturePlane& plane, std::size_t index, LadderMode mode, No
 }
 
 /// Whether all images are JPEGs that take few bytes together. Then no rung below a colour's own is worth
-/// storing, and of its mips one of the highest, where the source is of quality 30 and more: of 33 models with
-/// images of 256 to 1024 px. What is not tried is a third of the stage's time. Mips of normals of quality 70
+/// storing, and of its mips one of the highest, where the source is of quality 30 and more: of 28 models with
+/// images of 256 and 512 px. What is not tried is a third of the stage's time. Mips of normals of quality 70
 /// need lower ones.
 bool are_few_bytes(const std::vector<Image>& images) {
   constexpr std::size_t kFewBytes = 150'000;
