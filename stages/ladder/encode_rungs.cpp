@@ -461,7 +461,7 @@ std::vector<PlaneLadder> encode_rungs(const Fragments& fragments, const std::vec
 }
 
 SourceCodec make_source_codec(const TexturePlane& plane, const Pixels& pixels, const Image& image,
-                              const LadderOptions& options, const RunContext& context) {
+                              const LadderOptions& options, bool alone, const RunContext& context) {
   if (plane.mip > 0 || plane.role == TextureRole::kAlpha || image.format != ImageFormat::kJpeg) return {};
   SourceCodec out;
   RunContext quiet = context;
@@ -483,7 +483,7 @@ SourceCodec make_source_codec(const TexturePlane& plane, const Pixels& pixels, c
   if (!options.prune) below = asked_qualities(plane.role, options);
   const int top = std::max(quality_of(source->layout.quantisers[0]), below.empty() ? 1 : below.back() + 1);
   out.bits = bits_by_quality(*source, top, quiet);
-  if (options.prune) below = qualities_by_bytes(out.bits, top);
+  if (options.prune && !alone) below = qualities_by_bytes(out.bits, top);
   auto codec = std::make_unique<CoefficientCodec>(std::move(source));
   codec->add_standard_rungs(below, quiet);
   if (codec->add_top(top, quiet))

@@ -26,12 +26,12 @@ struct SourceCodec {
 ///   3.0). Multiples of the source's own quantisers were tried: on four scans the same bytes at equal error
 ///   at high qualities, up to a tenth more at low ones.
 /// - `options.prune`: the qualities below are those whose bytes are nearest to fixed parts of the top's.
-///   Otherwise they are all that `options` asks for, but 100.
+///   Otherwise they are all that `options` asks for, but 100. `alone`: with `options.prune` there is none.
 /// The codec's train() has no use for its sample. `pixels` are the plane's, filled; `plane`, `pixels` and
 /// `options` outlive the codec. It holds two bytes for every sample of the source. No codec for mips, alpha
 /// planes and other formats. Same bytes for any thread count.
 SourceCodec make_source_codec(const TexturePlane& plane, const Pixels& pixels, const Image& image,
-                              const LadderOptions& options, const RunContext& context);
+                              const LadderOptions& options, bool alone, const RunContext& context);
 
 std::vector<std::size_t> covered_fragments(const TexturePlane& plane);
 

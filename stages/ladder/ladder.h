@@ -8,7 +8,7 @@
 
 namespace texmesh {
 
-inline constexpr int kLadderVersion = 19;
+inline constexpr int kLadderVersion = 20;
 
 /// Side of the smallest fragments that are coded progressively: below it scans' headers and tables cost more
 /// than refinement saves.

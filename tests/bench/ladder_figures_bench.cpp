@@ -42,7 +42,7 @@ std::size_t least_bytes(const std::vector<std::uint8_t>& file, const TexturePlan
   const Image image = probe_image("whole", file, {});
   const Pixels pixels = decode_image(image);
   const LadderOptions options;
-  const SourceCodec source = make_source_codec(plane, pixels, image, options, threads(2));
+  const SourceCodec source = make_source_codec(plane, pixels, image, options, false, threads(2));
   if (!source.codec) return 0;
   const std::vector<CodecRung> rungs = source.codec->train({}, threads(2));
   const std::size_t top = rungs.size() - 1;

@@ -6,6 +6,8 @@
 #include <numeric>
 
 #include "stages/fragment_codec/fragment_codec.h"
+#include "stages/image/decode_image.h"
+#include "stages/jpeg/jpeg.h"
 #include "tests/stages/ladder/mip_chain.h"
 
 namespace texmesh::choose_rungs_test {
@@ -137,6 +139,27 @@ TEST(ChooseRungs, WithoutAPreviewThereIsNoChoice) {
   EXPECT_THROW(encode_ladder(chain.fragments, chain.pixels, {}, {}, options, RunContext{}), StageError);
   options.prune = false;
   EXPECT_EQ(encode_ladder(chain.fragments, chain.pixels, {}, {}, options, RunContext{}).planes.size(), 2u);
+}
+
+TEST(ChooseRungs, FewBytesOfJpegTryTheHighestRungsOfMips) {
+  Chain chain = make_chain(false);
+  const Bytes file = encode_jpeg(chain.pixels[0], 70, Subsampling::k420);
+  ASSERT_LT(file.size(), 150'000u);
+  const std::vector<Image> images{probe_image("a picture", file, {})};
+  for (TexturePlane& plane : chain.fragments.planes) {  // partly covered blocks begin with the rung below
+    plane.coverage.assign(plane.coverage.size(), 0x3c);
+    plane.covered_texels.assign(plane.fragment_count(), 32 * 64);
+  }
+  const auto ladder_of = [&](std::vector<int> rungs) {
+    LadderOptions options;
+    options.rungs = std::move(rungs);
+    return encode_ladder(chain.fragments, chain.pixels, chain.previews(), images, options, RunContext{});
+  };
+  const Ladder all = ladder_of({5, 8, 11, 18, 30, 53, 75, 86, 93, 97}), highest = ladder_of({86, 93, 97});
+  EXPECT_EQ(all.planes[0].rungs.size(), 1u);
+  ASSERT_EQ(all.planes[1].rungs.size(), highest.planes[1].rungs.size());
+  for (std::size_t r = 0; r < all.planes[1].rungs.size(); ++r)
+    EXPECT_EQ(all.planes[1].rungs[r].data, highest.planes[1].rungs[r].data);
 }
 
 }  // namespace texmesh::choose_rungs_test

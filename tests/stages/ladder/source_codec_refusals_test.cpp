@@ -30,7 +30,7 @@ TEST(SourceCodec, JpegsThatCannotBeCutAreCodedAnewAndSaySo) {
 
 TEST(SourceCodec, NoneForOtherFormatsMipsAlphaAndCodecs) {
   const auto has_one = [](Scene scene) {
-    const SourceCodec source = make_source_codec(scene.plane(), scene.pixels[0], scene.image, {}, {});
+    const SourceCodec source = make_source_codec(scene.plane(), scene.pixels[0], scene.image, {}, false, {});
     EXPECT_EQ(source.why_not, "");
     return source.codec != nullptr;
   };
@@ -54,7 +54,8 @@ TEST(SourceCodec, EveryTruncationHasNoCodec) {
   for (std::size_t length = 2; length + 2 < whole.size(); length += 1 + length / 40) {
     scene.image.bytes.assign(whole.begin(), whole.begin() + static_cast<std::ptrdiff_t>(length));
     try {
-      const SourceCodec source = make_source_codec(scene.plane(), scene.pixels[0], scene.image, {}, {});
+      const SourceCodec source =
+          make_source_codec(scene.plane(), scene.pixels[0], scene.image, {}, false, {});
       EXPECT_FALSE(source.codec) << length;
       EXPECT_NE(source.why_not, "") << length;
     } catch (const InputError&) {  // the header's colour profile cannot be looked for

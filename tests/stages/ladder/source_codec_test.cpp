@@ -165,11 +165,13 @@ TEST(SourceCodec, BytesAreAtMostTheSources) {
 TEST(SourceCodec, ChosenQualitiesAreByBytes) {
   Scene scene = scene_of(image_of(make_jpeg({"", 3, 2, 2, false, false, 95}, 512, 512)), 64);
   scene.plane().covered_texels.assign(64, 64 * 64);
-  const SourceCodec source = make_source_codec(scene.plane(), scene.pixels[0], scene.image, {}, {});
+  const SourceCodec source = make_source_codec(scene.plane(), scene.pixels[0], scene.image, {}, false, {});
   ASSERT_TRUE(source.codec);
   const std::vector<CodecRung> rungs = source.codec->train({}, {});
   ASSERT_GT(rungs.size(), 2u);
   EXPECT_EQ(rungs.back().quality, 95);
+  const SourceCodec alone = make_source_codec(scene.plane(), scene.pixels[0], scene.image, {}, true, {});
+  EXPECT_EQ(alone.codec->train({}, {}).size(), 1u);
   std::vector<Bytes> streams(rungs.size());
   const auto encoder = source.codec->encoder();
   const Pixels& pixels = scene.pixels[0];

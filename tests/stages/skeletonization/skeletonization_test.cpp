@@ -256,6 +256,15 @@ TEST(Skeletonization, AClosedSurfaceOfFewTrianglesIsContractedWithoutAWrap) {
         radius_error(m, s, radius, [&](Vec3f p) { return std::fabs(p.x) < 3 - 1.5f * radius; });
     EXPECT_LT(e.largest, 0.1) << radius;  // 1.9 where triangles get long along it
   }
+  Random random{5};
+  for (const double noise : {0.1, 0.6}) {  // of surfaces that cross themselves
+    Mesh m = testing::bumpy_sphere(24, 36, 0.3f);
+    for (Vec3f& p : m.positions) {
+      const auto off = [&] { return noise * (random.uniform() * 2 - 1); };
+      p = p + to_float(Vec3d{off(), off(), off()});
+    }
+    expect_sound(run(m), m.positions.size());
+  }
 }
 
 TEST(Skeletonization, WorkCapsFallBackStepByStep) {
