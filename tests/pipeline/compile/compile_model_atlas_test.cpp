@@ -53,10 +53,10 @@ class AutoAtlas : public ::testing::Test {
     options_.proxies.mode = ProxyMode::kNone;
     options_.set_by_user = {"proxies.mode"};
   }
-  void write_noise(std::uint32_t side_px) {
-    Pixels picture{side_px, side_px, 3, {}};
+  void write_noise(std::uint32_t side_px, std::uint32_t channels = 3) {
+    Pixels picture{side_px, side_px, channels, {}};
     testing::Random random{1};
-    for (std::uint32_t i = 0; i < 3 * side_px * side_px; ++i)
+    for (std::uint32_t i = 0; i < channels * side_px * side_px; ++i)
       picture.data.push_back(static_cast<std::uint8_t>(random.next() % 256));
     const Bytes png = write_png(picture);
     testing::write_text(folder_ / "a.png", {png.begin(), png.end()});
@@ -134,6 +134,17 @@ TEST_F(AutoAtlas, StrangeModelsAreRebuiltOrKept) {
     testing::write_text(folder_ / "a.obj", obj_of(models[i]));
     for (const AtlasMode mode : {AtlasMode::kAuto, AtlasMode::kKeep, AtlasMode::kRebuild})
       EXPECT_GT(compile(mode).package_bytes, 0u);
+  }
+}
+
+TEST_F(AutoAtlas, TransparentModelsAreRebuiltOrKept) {
+  write_noise(64, 4);
+  testing::write_text(folder_ / "a.mtl", "newmtl a\nmap_Kd a.png\nmap_d a.png\nnewmtl b\nKd 1 0 0\nd 0.5\n");
+  testing::write_text(folder_ / "a.obj", obj_of(testing::in_charts(testing::bumpy_sphere(12, 16), 65)));
+  for (const AtlasMode mode : {AtlasMode::kAuto, AtlasMode::kKeep, AtlasMode::kRebuild}) {
+    SCOPED_TRACE(static_cast<int>(mode));
+    EXPECT_GT(compile(mode).package_bytes, 0u);
+    EXPECT_NE(testing::read_text(folder_ / "a.texmesh").find(R"("role":"alpha")"), std::string::npos);
   }
 }
 

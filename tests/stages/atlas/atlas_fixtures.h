@@ -104,7 +104,7 @@ inline std::vector<Mesh> strange_models() {
           huge,
           one,
           with_uv(sliver_sheet(6), 1),
-          with_uv(dust(60, 0.01f), 1),
+          with_uv(dust(65, 0.01f), 1),    // more components than a word has bits
           with_uv(dust(1500, 0.01f), 1),  // crumbs
           with_uv(random_soup(random, 30, 80), 1)};
 }
