@@ -116,7 +116,7 @@ TEST(ScaleFrames, WithoutNormalsThereAreNone) {
   Nest nest;
   nest.scales.mesh.normals.clear();
   EXPECT_TRUE(scale_frames(nest.scales, 1, {}).normals.empty());
-  EXPECT_TRUE(lit_scale(nest.scales, 1, {}).normals.empty());
+  EXPECT_TRUE(lit_scale(nest.scales, 1, RunContext{}).normals.empty());
 }
 
 TEST(ScaleFrames, VanishedComponentsSayNothing) {
@@ -142,7 +142,7 @@ TEST(ScaleFrames, VanishedComponentsSayNothing) {
 
 TEST(ScaleFrames, ALitScaleIsTheExtractedOneWithItsFrames) {
   const Nest nest;
-  const Mesh plain = extract_scale(nest.scales, nest.scales.scales[1]), lit = lit_scale(nest.scales, 1, {});
+  const Mesh plain = extract_scale(nest.scales, nest.scales.scales[1]), lit = lit_scale(nest.scales, 1, RunContext{});
   const ScaleFrames frames = scale_frames(nest.scales, 1, {});
   EXPECT_EQ(lit.positions, plain.positions);
   EXPECT_EQ(lit.triangles, plain.triangles);
