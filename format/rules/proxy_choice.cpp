@@ -111,7 +111,7 @@ ProxyLoss proxy_loss(const Manifest& manifest, std::size_t proxy, double display
 std::optional<std::size_t> serving_proxy(const Manifest& manifest, double displayed_px) {
   for (std::size_t k = 0; k < manifest.proxies.size(); ++k) {
     const ProxyLoss loss = proxy_loss(manifest, k, displayed_px);
-    if (manifest.proxies[k].glb.bytes > kStartBytes) break;
+    if (manifest.proxies[k].glb.bytes > kMostServingBytes) break;
     if (loss.flip <= kSameFlip && loss.flip_p95 <= kSameFlipP95) return k;
   }
   return std::nullopt;

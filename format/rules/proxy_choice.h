@@ -19,8 +19,10 @@ inline constexpr double kProxyLossPerDoubling = 1.6;
 
 /// Lit pictures with at most these losses cannot be told from S_0's (SPEC.md, 5.5).
 inline constexpr double kSameFlip = 0.05, kSameFlipP95 = 0.15;
-/// The smallest proxy that cannot be told from S_0 at that height, of at most kStartBytes; nothing where
-/// there is none. A load does not end with a larger file, for one of three times its bytes is twice as near.
+/// Of a larger file scales come nearer, so a load does not end with it.
+inline constexpr std::uint64_t kMostServingBytes = 100000;
+/// The smallest proxy that cannot be told from S_0 at that height, of at most kMostServingBytes; nothing
+/// where there is none.
 std::optional<std::size_t> serving_proxy(const Manifest& manifest, double displayed_px);
 
 /// Bytes behind those of the first request that a client fetches for a proxy; the first picture, which comes

@@ -28,8 +28,7 @@ struct ProxiesOptions {
 };
 
 /// The whole object in small files: coarse meshes with atlases of their own, whose textures are baked from
-/// S_0 with the source's texels, and behind the smallest one scales with the source's atlas, whichever looks
-/// better.
+/// S_0 with the source's texels, and from 100 kB on scales with the source's atlas, whichever looks better.
 /// - Baked mesh: simplification without regard to the source's charts, one run for all sizes; new charts,
 ///   packed into one square. Triangles of one class of materials (unlit or lit, single- or double-sided,
 ///   opaque, mask or blend) become one material. Of meshes of more than 250,000 triangles a scale of about as

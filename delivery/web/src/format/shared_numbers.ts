@@ -108,6 +108,7 @@ export const proxyLossPerDoubling = 1.6;
 export const sameFlip = 0.05;
 export const sameFlipP95 = 0.15;
 /** Of a larger file scales come nearer, so a load does not end with it. */
+export const mostServingBytes = 100000;
 export const moments = 64; // at which the time left is looked at
 export const meshTimeShare = 0.5; // of the time left
 export const paying = 0.95; // of the mean without a step
