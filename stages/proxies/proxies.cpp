@@ -12,7 +12,7 @@ constexpr double kFirstMeshShare = 0.7, kMeshShare = 0.65, kLargeMeshShare = 0.5
 constexpr int kFineFrom = 100000, kNormalMapPaysFrom = 100000;  // bytes
 // Bytes from which on scales are tried. A scale of the saxophone, of 2,242 charts, is plainly nearer from
 // there on (.033 for .047 at 450 kB); of a site without mip levels what is baked is nearer for longer.
-constexpr int kScaleFrom = 40000;
+constexpr int kScaleFrom = 100000;
 constexpr int kFirstBits = 10, kBits = 11, kFineBits = 12;  // of positions
 constexpr double kMostOfSource = 0.35;
 constexpr double kWorthIts = 0.9;  // of the FLIP of the proxy before: what a scale is kept for

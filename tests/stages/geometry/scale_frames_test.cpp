@@ -142,7 +142,8 @@ TEST(ScaleFrames, VanishedComponentsSayNothing) {
 
 TEST(ScaleFrames, ALitScaleIsTheExtractedOneWithItsFrames) {
   const Nest nest;
-  const Mesh plain = extract_scale(nest.scales, nest.scales.scales[1]), lit = lit_scale(nest.scales, 1, RunContext{});
+  const Mesh plain = extract_scale(nest.scales, nest.scales.scales[1]),
+             lit = lit_scale(nest.scales, 1, RunContext{});
   const ScaleFrames frames = scale_frames(nest.scales, 1, {});
   EXPECT_EQ(lit.positions, plain.positions);
   EXPECT_EQ(lit.triangles, plain.triangles);
