@@ -209,7 +209,7 @@ class GroupPictures {
 std::vector<TexturePlan> plans_of(const SourceTextures& textures, const SourceTextures::Group& group,
                                   double most_bytes) {
   constexpr double kMostTexelsPerByte = 4;
-  const std::array<std::vector<int>, 4> qualities{{{60, 85}, {30, 60, 85}, {60}, {60}}};  // by size
+  const std::array<std::vector<int>, 4> qualities{{{30, 60, 85}, {30, 60, 85}, {60}, {60}}};  // by size
   constexpr int kQualityOfTheSmallest = 85;
   std::vector<TexturePlan> out;
   int steps = 0;
