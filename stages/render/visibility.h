@@ -14,6 +14,7 @@ struct ViewCamera {
 };
 /// Around S_0. StageError of `stage` where it has no extent.
 BoundingSphere sphere_around(const Mesh& finest, const char* stage);
+/// The camera that sees the sphere from the direction z, of unit length and not straight up or down.
 ViewCamera view_towards(Vec3d z, const BoundingSphere& bounds);
 /// The camera of view `index`, 0 <= index < count. The `count` directions are spread evenly over the sphere.
 /// The directions are the same for every model.
