@@ -54,6 +54,23 @@ test('memory: a context that is lost with much in it comes back with a smaller p
   }, sharp);
 }, {seconds: 150});
 
+test('memory: a context that is lost again while its pictures are made anew', async () => {
+  await onPage(html(large(2), two), async (page) => {
+    await complete(page);
+    for (const delay of [0, 80, 300]) {
+      await lose(page);
+      await page.waitForTimeout(50);
+      await restore(page);
+      await page.waitForFunction(() => !window.own.isContextLost());
+      await page.waitForTimeout(delay);
+    }
+    await complete(page);
+    counted(await bytes(page));
+    for (const i of [0, 1]) check(await covered(page, i, `memory-lost-again-${i}`) > 0.05, `nothing is seen of scan ${i}`);
+    page.said = page.said.filter((s) => !/CONTEXT_LOST|Context Lost|Context Restored/i.test(s));
+  }, sharp);
+}, {seconds: 60});
+
 test('memory: metal mirrors its room again when a lost context is back', async () => {
   await onPage(html(elements(1, '', ['metal'])), async (page) => {
     const mirrors = () => page.waitForFunction(() => document.querySelector('texmesh-viewer').model?.scene.environment, null, {timeout: 20000});

@@ -29,6 +29,11 @@ export async function gpuIdle(renderer: WebGLRenderer, mostS = 0.5): Promise<voi
   if (lives()) gl.deleteSync(fence);
 }
 
+/** Whether the graphics context is gone. What is made meanwhile cannot even be deleted later. */
+export function isLost(renderer: WebGLRenderer): boolean {
+  return renderer.getContext().isContextLost();
+}
+
 /** Programs that were waited for: models of one page share them. */
 const ready = new WeakSet<WebGLProgram>();
 
@@ -36,33 +41,40 @@ const ready = new WeakSet<WebGLProgram>();
 async function programsReady(renderer: WebGLRenderer, mostS: number,
     stopIfCancelled: () => void): Promise<void> {
   const end = nowS() + mostS;
-  const programs = (renderer.info?.programs ?? []) as (WebGLProgram & { isReady?(): boolean })[];
-  for (const program of programs.filter((p) => !ready.has(p))) {
+  const programs = (): (WebGLProgram & { isReady?(): boolean })[] => renderer.info?.programs ?? [];
+  for (const program of programs().filter((p) => !ready.has(p))) {
+    // not of another model, which went meanwhile, or of a lost context
+    const lives = (): boolean => programs().includes(program) && !isLost(renderer);
     do {
       await sleepS(0.004);
       stopIfCancelled();
-    } while (program.program && program.isReady?.() === false && nowS() < end);
-    if (!program.program) continue; // of another model, which went meanwhile
+    } while (lives() && program.isReady?.() === false && nowS() < end);
+    if (!lives()) continue;
     program.getUniforms();
     ready.add(program);
   }
 }
 
-/** Prepares programs and previews for the first frame, each in a turn of its own: the page goes on. */
+/**
+ * Prepares programs and previews for the first frame, each in a turn of its own: the page goes on. A lost
+ * context is left alone: the first frame behind the loss makes all.
+ */
 export async function readyToDraw(load: FirstDrawing, scene: Object3D, shape: Object3D): Promise<void> {
   const { signal, options: { renderer } } = load;
   const stopIfCancelled = (): void => throwIfAborted(signal);
+  const unlessLost = (prepare: () => void): void => {
+    stopIfCancelled();
+    if (!isLost(renderer)) prepare();
+  };
   let root = scene;
   while (root.parent) root = root.parent;
   await sleepS(0);
-  stopIfCancelled();
-  renderer.compile(shape, load.view.camera ?? new Camera(), root as Scene);
+  unlessLost(() => renderer.compile(shape, load.view.camera ?? new Camera(), root as Scene));
   await gpuIdle(renderer, mostCompileS); // or what comes next would wait for the programs
   await programsReady(renderer, mostCompileS, stopIfCancelled);
   for (const [, texture] of materialsOf(shape).flatMap(texturesOf)) {
     await sleepS(0);
-    stopIfCancelled();
-    renderer.initTexture(texture);
+    unlessLost(() => renderer.initTexture(texture));
   }
   await gpuIdle(renderer, mostCompileS);
 }

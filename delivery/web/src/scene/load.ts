@@ -7,7 +7,7 @@ import type { WorkerPool } from '../worker/pool';
 import type { LoadOptions, LoadState, LoadedModel } from './api';
 import { gpuBytes } from './gpu';
 import { LoadContext } from './load_context';
-import { disposeGeometries, texturesOf } from './scale_parts';
+import { disposeGeometries, materialsOf, texturesOf } from './scale_parts';
 import { ScaleSource } from './scale_source';
 import type { ShownProxy } from './shown_proxy';
 import { ShownScale } from './shown_scale';
@@ -126,7 +126,7 @@ function forgetGpu(objects: readonly Object3D[], planes: LoadState['planes'],
     materials: readonly Material[]): void {
   objects.forEach(disposeGeometries);
   for (const texture of planes.flatMap((p) => p.textures)) texture.dispose();
-  for (const material of materials) {
+  for (const material of new Set([...materials, ...objects.flatMap(materialsOf)])) {
     for (const [, texture] of texturesOf(material)) texture.dispose();
     material.dispose();
   }
@@ -144,7 +144,8 @@ class ModelLoad {
   private coming_?: Promise<TextureLoad>;
   private refining_?: Promise<void>;
   private refineAgain_ = false;
-  private restoring_?: Promise<unknown>;
+  private restoring_?: Promise<unknown>; // from a loss of the context on, until all is made anew
+  private contextBack_?: () => void;
   private leaving_?: Promise<void>;
   private readonly endRequests_: () => void;
   private readonly leaveRoom_: () => void;
@@ -278,6 +279,7 @@ class ModelLoad {
   cancel(): void {
     this.context.cancel();
     this.scale_.endRetry();
+    this.contextBack_?.(); // nobody waits for it any more
     if (this.context.phase !== 'failed') this.context.phase = 'cancelled';
   }
   dispose(): void {
@@ -344,10 +346,11 @@ class ModelLoad {
         this.refineAgain_ = false;
         return this.rest_(); // a proxy is enough
       }
+      let restored: Promise<unknown> | undefined;
       do {
-        await this.restoring_;
+        while (restored !== this.restoring_) await (restored = this.restoring_);
         if (!context.signal.aborted) await this.refineOnce_(this.textures!);
-      } while (this.refineAgain_ && !context.signal.aborted);
+      } while ((this.refineAgain_ || restored !== this.restoring_) && !context.signal.aborted);
     } finally {
       this.refining_ = undefined; // a request from now on, by listeners too, is a turn of its own
     }
@@ -367,12 +370,15 @@ class ModelLoad {
   }
   private lose_(): void {
     forgetGpu(this.scale_.objects(), this.textures?.planes() ?? [], this.materials);
+    this.textures?.lose();
+    this.restoring_ = new Promise<void>((back) => (this.contextBack_ = back));
     this.context.emit('context', { lost: true });
   }
   /** After a lost context: three.js makes geometries and pictures anew; composed textures are gone. */
   private restore_(): void {
     this.context.emit('context', { lost: false });
     this.makeAnew_();
+    this.contextBack_?.();
   }
   /** Makes anew what the GPU has lost, or has refused, within the memory that there is now. */
   private makeAnew_(): void {

@@ -97,11 +97,13 @@ export class ScaleSource {
   }
   /** All scales that are on the GPU, or may be. */
   all(): Object3D[] {
-    return [...new Set(this.shapes_.values())].filter((shape) => !this.offGpu_.has(shape));
+    // the stream's coarsest scale has taken the place of the GLB's
+    const shapes = [...this.shapes_.values(), ...(this.first_ ? [this.first_.scene] : [])];
+    return [...new Set(shapes)].filter((shape) => !this.offGpu_.has(shape));
   }
   /** Takes all scales off the GPU; those that are drawn get there again. */
   leaveGpu(): void {
-    for (const shape of this.shapes_.values()) {
+    for (const shape of this.all()) {
       disposeGeometries(shape); // of a lost context they are gone already
       if (!shape.parent) this.offGpu_.add(shape);
     }

@@ -96,6 +96,10 @@ export class ShownPlanes {
       better: (there: number) => boolean): Promise<boolean> {
     return this.set_.upload(to, levels, fragment, rung, better);
   }
+  /** The GPU has lost everything: nothing goes there until showAnew(). */
+  lose(): void {
+    this.set_.stop();
+  }
   dispose(): void {
     this.set_.dispose();
   }
@@ -193,7 +197,7 @@ export class ShownPlanes {
    * preview. Fragments may come from then on; `shown` resolves when the scene has changed.
    */
   async show(choices: readonly PlaneChoice[], anew = false): Promise<{ shown: Promise<unknown> }> {
-    const { signal } = this.load_;
+    const { load_: { signal }, set_: first } = this;
     const beganS = nowS();
     const shown: Promise<void>[] = [];
     for (const choice of choices) {
@@ -205,9 +209,15 @@ export class ShownPlanes {
         const needed = !this.set_.planes.has(base) && (anew || role === 'alpha' || !this.isUsed(base));
         const preview = needed ? await this.previewOf_(base) : undefined;
         throwIfAborted(signal); // after the end of the load nobody would dispose of the plane
-        const planeShown = (): void => this.load_.emit('plane', { base, plane, widthPx, heightPx });
-        shown.push(this.set_.show(choice, preview).then(planeShown, lostPlane)
-          .finally(() => preview?.close()));
+        const { set_: set } = this;
+        if (set !== first && (anew || set.planes.has(base))) {
+          preview?.close(); // lost again meanwhile: whoever made the other set shows all of this
+          continue;
+        }
+        const planeShown = (): void => {
+          if (!set.stopped) this.load_.emit('plane', { base, plane, widthPx, heightPx });
+        };
+        shown.push(set.show(choice, preview).then(planeShown, lostPlane).finally(() => preview?.close()));
       } catch (error) {
         lostPlane(error);
       }

@@ -9,6 +9,7 @@ export class ShownProxy {
   /** In the scene; -1: none. */
   shown = -1;
   private object_?: Object3D;
+  private coming_?: Object3D; // the GPU prepares for it
 
   constructor(
     private readonly load_: LoadContext,
@@ -19,7 +20,7 @@ export class ShownProxy {
     return this.object_ ? materialsOf(this.object_) : [];
   }
   get objects(): Object3D[] {
-    return this.object_ ? [this.object_] : [];
+    return [this.object_, this.coming_].filter((object) => object !== undefined);
   }
   /** The bytes of a proxy. */
   fetch(proxy: number): Promise<Uint8Array> {
@@ -32,8 +33,9 @@ export class ShownProxy {
     const { reader, options, object, signal } = load;
     const glb = await reader.decoded(signal, 'plainGlb', await bytes);
     const { scene: shape } = await parseScale(options.gltfLoader(), glb, false);
+    this.coming_ = shape;
     try {
-      await readyToDraw(load, scene, shape);
+      await readyToDraw(load, scene, shape).finally(() => (this.coming_ = undefined));
       throwIfAborted(signal);
     } catch (error) {
       free(shape);

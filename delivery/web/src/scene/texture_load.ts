@@ -89,6 +89,8 @@ export class TextureLoad {
   private list_?: FragmentList;
   private alike_?: (scale: number) => number; // by the viewer's own JND
   private lookedS_ = 0; // when the proxy and the scale were compared last
+  private had_?: PlaneComposer[]; // what the GPU has lost and is being made anew
+  private restores_ = 0;
   private fruitlessRounds_ = 0; // rounds of refining that brought nothing, one after the other
 
   constructor(private readonly load_: LoadContext, private readonly scale_: ShownScale,
@@ -113,6 +115,9 @@ export class TextureLoad {
   }
   readPlane(base: number): Uint8Array | undefined {
     return this.planes_.readPlane(base);
+  }
+  lose(): void {
+    this.planes_.lose();
   }
   dispose(): void {
     this.fetching_.dispose();
@@ -273,7 +278,8 @@ export class TextureLoad {
    */
   async restore(): Promise<boolean> {
     const { planes_: planes, scale_: scale, fetching_: fetching } = this;
-    const before = planes.all();
+    const turn = ++this.restores_;
+    const before = (this.had_ ??= planes.all());
     const coarserScale = this.followMemory_();
     const choices = planes.fitting(before, scale.wanted);
     const had = new Map(before.map((p) => [p.base, p]));
@@ -294,6 +300,7 @@ export class TextureLoad {
     });
     await fetching.fetch(wishes.filter((w) => w.rung >= 0));
     await fetching.composed();
+    if (turn === this.restores_) this.had_ = undefined; // or the GPU has lost it once more
     return (await coarserScale) || coarser.length > 0;
   }
   /** Shows a coarser scale where the memory has no room for the one that is wanted. False: there is room. */

@@ -7,7 +7,7 @@ import type { Levels } from '../worker/protocol';
 import type { Compression } from './blocks/compression';
 import { type PlaneComposer, planeComposer } from './composer';
 import type { Clear } from './enlarge';
-import { isSoftware } from './gpu';
+import { isLost, isSoftware } from './gpu';
 import { type MaterialSet, type Slot, disposeTexture, texturesIn } from './scale_parts';
 import { UploadQueue } from './upload_queue';
 
@@ -30,10 +30,19 @@ export class TextureSet {
     private readonly blocksOf_: (plane: number) => [Compression, BlockFormat] | undefined = () => undefined,
   ) {
     this.uploads_ = new UploadQueue(renderer_, () => this.planes.forEach((plane) => plane.updateMips()));
+    this.uploads_.disposed = isLost(renderer_);
     // once, and soon: a GPU that has something to draw keeps the page waiting for its name
     this.software_ = isSoftware(renderer_);
   }
 
+  /** Nothing goes to the GPU any more: its context was lost, or the load has ended. */
+  get stopped(): boolean {
+    return this.uploads_.disposed;
+  }
+  /** Nothing goes to the GPU from now on; the planes still tell what was there. */
+  stop(): void {
+    this.uploads_.disposed = true;
+  }
   /**
    * Shows a texture by this plane from now on. The plane is filled with the picture shown so far (or the
    * preview) in small steps, then the materials are changed at once. Resolves when the materials have been
@@ -51,8 +60,10 @@ export class TextureSet {
     }));
     const old = this.slotsOf_(base).map(textureAt);
     const shown = old.find((texture) => (texture.image as ImageBitmap | null)?.width);
-    next.view(shown ?? old[0] ?? new Texture()); // a finer scale may bring the material that wants it
+    if (this.stopped && before) return;
+    if (!this.stopped) next.view(shown ?? old[0] ?? new Texture()); // a finer scale may bring the material
     planes.set(base, next);
+    if (this.stopped) return; // a later set shows it
     try {
       let enlarges!: (clear?: Clear) => void;
       const enlarged = new Promise<Clear | undefined>((done) => (enlarges = done));
@@ -61,14 +72,15 @@ export class TextureSet {
         enlarged.then((clear) => clear?.(fragment) ?? ready).catch(() => ready).catch(() => undefined);
       await ready;
     } catch (error) {
+      if (this.stopped) return;
       if (before) planes.set(base, before);
       else planes.delete(base);
       next.dispose();
       throw error;
     }
-    next.updateMips();
+    if (!this.stopped) next.updateMips();
     await next.blocks?.settled();
-    if (this.uploads_.disposed || planes.get(base) !== next) return; // another has taken its place meanwhile
+    if (this.stopped || planes.get(base) !== next) return; // another has taken its place meanwhile
     this.showInMaterials_(next);
     if (before) before.dispose();
     else if (this.textures_[base].role !== 'alpha') old.forEach(disposeTexture);
@@ -79,11 +91,12 @@ export class TextureSet {
   }
   /** Materials that came with a later scale show the planes, too. */
   showInNewMaterials(): void {
-    this.planes.forEach((plane) => plane.filled && this.showInMaterials_(plane));
+    if (!this.stopped) this.planes.forEach((plane) => plane.filled && this.showInMaterials_(plane));
   }
   /** Queues a fragment; resolves with true when it is shown, with false when its rung is no better. */
   async upload(plane: PlaneComposer, levels: Levels, fragment: number, rung: number,
       better: (there: number) => boolean): Promise<boolean> {
+    if (this.stopped) return false;
     ++this.pending;
     plane.come.add(fragment);
     let shown = false;
@@ -103,7 +116,7 @@ export class TextureSet {
     this.uploads_.finishMips();
   }
   dispose(): void {
-    this.uploads_.disposed = true;
+    this.stop();
     this.planes.forEach((plane) => plane.dispose());
     this.planes.clear();
   }
@@ -143,7 +156,7 @@ export class TextureSet {
         else await this.scale_(next, old!);
       } catch (error) {
         // A browser whose workers cannot draw leaves enlarging to the GPU.
-        if (preview || next.rungs.some((rung) => rung >= 0) || this.uploads_.disposed) throw error;
+        if (preview || next.rungs.some((rung) => rung >= 0) || this.stopped) throw error;
         await this.scale_(next, old!);
       }
     if (this.isXy_(next)) this.readTwoChannels_ ??= (await import('./blocks/two_channels')).readTwoChannels;
@@ -156,7 +169,7 @@ export class TextureSet {
   /** Fills a plane with a texture that stands on the GPU. */
   private async scale_(next: PlaneComposer, from: Texture, format?: BlockFormat): Promise<void> {
     if (next.blocks) await this.refill_(next, from, format);
-    else next.fill(from);
+    else if (!this.stopped) next.fill(from);
   }
   private async refill_(next: PlaneComposer, from: Texture, format?: BlockFormat): Promise<void> {
     await this.blocksOf_(next.plane)?.[0].refill(next, from, format, this.renderer_, this.pool_,

@@ -37,7 +37,7 @@ export class UploadQueue {
   /** Makes the smallest levels now. */
   finishMips(): void {
     this.mipsAt_ = performance.now();
-    this.updateMips_();
+    if (!this.disposed) this.updateMips_();
   }
 
   private async uploadWaiting_(): Promise<void> {
