@@ -22,7 +22,7 @@ double loss_at(const std::vector<double>& sizes, const std::vector<double>& loss
 constexpr int kMoments = 64;            // at which the time left is looked at
 constexpr double kMeshTimeShare = 0.5;  // of the time left
 constexpr double kPaying = 0.95;        // of the mean without a step
-constexpr double kMostStepTime = 0.2;   // of the time left: what comes later takes too much from the end
+constexpr double kMostStepTime = 0.05;  // of the time left: what comes later takes too much from the end
 
 std::uint64_t beyond_first_request(std::uint64_t begin, std::uint64_t bytes) {
   const std::uint64_t end = begin + bytes;
@@ -111,7 +111,7 @@ ProxyLoss proxy_loss(const Manifest& manifest, std::size_t proxy, double display
 std::optional<std::size_t> serving_proxy(const Manifest& manifest, double displayed_px) {
   for (std::size_t k = 0; k < manifest.proxies.size(); ++k) {
     const ProxyLoss loss = proxy_loss(manifest, k, displayed_px);
-    if (manifest.proxies[k].glb.bytes > kMostServingBytes) break;
+    if (manifest.proxies[k].glb.bytes > kStartBytes) break;
     if (loss.flip <= kSameFlip && loss.flip_p95 <= kSameFlipP95) return k;
   }
   return std::nullopt;

@@ -19,10 +19,8 @@ inline constexpr double kProxyLossPerDoubling = 1.6;
 
 /// Lit pictures with at most these losses cannot be told from S_0's (SPEC.md, 5.5).
 inline constexpr double kSameFlip = 0.05, kSameFlipP95 = 0.15;
-/// Of a larger file scales come nearer, so a load does not end with it.
-inline constexpr std::uint64_t kMostServingBytes = 100000;
-/// The smallest proxy that cannot be told from S_0 at that height, of at most kMostServingBytes; nothing
-/// where there is none.
+/// The smallest proxy that cannot be told from S_0 at that height, of at most kStartBytes; nothing where
+/// there is none. A load does not end with a larger file, for one of three times its bytes is twice as near.
 std::optional<std::size_t> serving_proxy(const Manifest& manifest, double displayed_px);
 
 /// Bytes behind those of the first request that a client fetches for a proxy; the first picture, which comes
@@ -44,9 +42,9 @@ struct StepLink {
 /// decide about scales and textures: from the index to the tables' end, and the coarsest scale's GLB.
 std::uint64_t document_bytes(const Manifest& manifest);
 
-/// The proxy that comes in the first fifth of the time left and lowers the mean FLIP of what is seen in it by
-/// at least a twentieth, of several the one that lowers it most; nothing where none does. `wanted`: the
-/// finest scale that is worth showing. What scales look like is supposed, see SPEC.md.
+/// The proxy that comes in the first twentieth of the time left and lowers the mean FLIP of what is seen in
+/// that time by at least a twentieth, of several the one that lowers it most; nothing where none does.
+/// `wanted`: the finest scale that is worth showing. What scales look like is supposed, see SPEC.md.
 std::optional<std::size_t> proxy_step(const Manifest& manifest, int wanted, double displayed_px,
                                       const StepLink& link);
 

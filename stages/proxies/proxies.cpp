@@ -10,11 +10,12 @@ constexpr std::uint32_t kLeastTriangles = 60;
 constexpr double kLeastBytesPerTriangle = 4;
 constexpr double kFirstMeshShare = 0.7, kMeshShare = 0.65, kLargeMeshShare = 0.55;
 constexpr int kFineFrom = 100000, kNormalMapPaysFrom = 100000;  // bytes
-// Bytes from which on scales are tried. A scale of the saxophone, of 2,242 charts, is plainly nearer from
-// there on (.033 for .047 at 450 kB); of a site without mip levels what is baked is nearer for longer.
-constexpr int kScaleFrom = 100000;
+// Bytes from which on scales are tried: all sizes but the first, which needs no decoder. Of a few large
+// charts a scale is nearer from there on (a yurt's .060 for .100 in a plan of 100 kB); of the saxophone's
+// 2,242 from 450 kB on (.033 for .047), and of a site without mip levels what is baked is nearer for longer.
+constexpr int kScaleFrom = 40000;
 constexpr int kFirstBits = 10, kBits = 11, kFineBits = 12;  // of positions
-constexpr double kMostOfSource = 0.35;
+constexpr double kMostOfSource = 0.4;
 constexpr double kWorthIts = 0.9;  // of the FLIP of the proxy before: what a scale is kept for
 // Of the smallest size: what is loaded soon needs no other first picture.
 constexpr double kMostOfSmallSource = 0.15;
@@ -52,7 +53,7 @@ constexpr const char* kScaleWins = "a scale with the source's atlas looks better
 constexpr const char* kWholeTakesFewer = "the whole object takes fewer";
 constexpr const char* kDoNotFit = "mesh and pictures do not fit";
 constexpr const char* kLittleBetter = "it would look little better than the proxy before it";
-constexpr const char* kOfSource = "proxies take at most 35 % of the source";
+constexpr const char* kOfSource = "proxies take at most 40 % of the source";
 constexpr const char* kSmallSource = "the smallest proxy would take more than 15 % of the source";
 
 std::uint32_t most_triangles(const Mesh& mesh, int most_bytes) {
@@ -285,7 +286,8 @@ Candidate ProxySizes::best_candidate(int bytes) {
   if (!scale.made) return baked;
   baked.kind = ProxyKind::kBakedBeatsScale;
   scale.large = flip_of(*scale.made, large_), baked.large = flip_of(*baked.made, large_);
-  return scale.large->mean() < baked.large->mean() ? std::move(scale) : std::move(baked);
+  const auto loss = [](const Candidate& c) { return c.flip.mean() * c.large->mean(); };
+  return loss(scale) < loss(baked) ? std::move(scale) : std::move(baked);
 }
 
 /// Why the candidate does not stay; null where it does. Plans code a scale's texels apart and pay for tables,

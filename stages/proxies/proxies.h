@@ -28,7 +28,8 @@ struct ProxiesOptions {
 };
 
 /// The whole object in small files: coarse meshes with atlases of their own, whose textures are baked from
-/// S_0 with the source's texels, and from 100 kB on scales with the source's atlas, whichever looks better.
+/// S_0 with the source's texels, and behind the smallest one scales with the source's atlas, whichever looks
+/// better.
 /// - Baked mesh: simplification without regard to the source's charts, one run for all sizes; new charts,
 ///   packed into one square. Triangles of one class of materials (unlit or lit, single- or double-sided,
 ///   opaque, mask or blend) become one material. Of meshes of more than 250,000 triangles a scale of about as
@@ -55,7 +56,7 @@ struct ProxiesOptions {
 ///   compared with what plans pay for scales: tables, the coarsest mesh, texels as their coding leaves them.
 ///   A small size is not tried where the likeliest scale is farther ahead of the last size than baked proxies
 ///   come by their bytes. Where a file of a scale fits, the nearer of both stays, but where it is less than a
-///   tenth nearer than the proxy before it. All proxies take at most 35 % of the source, of its images' files
+///   tenth nearer than the proxy before it. All proxies take at most 40 % of the source, of its images' files
 ///   and of S_0's mesh, coded. A source of which the smallest size is more than 15 % gets none: it is loaded
 ///   soon.
 /// Sizes that get no proxy have a note that says why; no model fails because of its proxies. `pixels` are

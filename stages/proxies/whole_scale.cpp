@@ -23,6 +23,7 @@ constexpr int kMeshAttempts = 3;
 constexpr int kMostQualityOfImage = 97;
 constexpr double kAimedFull = 0.98, kNearlyFull = 0.96;  // of the bytes for images
 constexpr double kMissed = 0.06;                         // of a mesh' bytes
+constexpr double kOfEstimate = 0.62;  // what a mesh of the usual coding takes, until one is coded
 
 const char* use_name(TextureUse use) {
   switch (use) {
@@ -247,6 +248,7 @@ std::optional<MadeProxy> WholeScales::finished(const Choice& choice, std::uint64
 std::optional<MadeProxy> WholeScales::of(std::uint64_t bytes, const RunContext& context) {
   if (hopeless_) return std::nullopt;
   measure(context);
+  of_estimate_ = kOfEstimate;  // a mesh of another size tells nothing of it
   const auto target = static_cast<double>(bytes);
   std::optional<Choice> choice;
   for (int attempt = 0; attempt < kMeshAttempts; ++attempt) {

@@ -68,7 +68,7 @@ class WholeScales {
   std::optional<std::pair<std::size_t, ScaleFrames>> frames_;  // of the scale that was last asked for
   std::map<MeshChoice, double> file_bytes_;                    // of files without images
   std::vector<double> estimates_;                              // of meshes' bytes, by scale
-  double of_estimate_ = 0.62;     // what a mesh of the usual coding takes of them
+  double of_estimate_ = 0;        // what a mesh of the usual coding takes of them
   double document_bytes_ = 1500;  // of a file without images, besides its mesh
 };
 

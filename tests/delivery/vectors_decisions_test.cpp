@@ -63,9 +63,9 @@ Json proxies() {
   };
   add("three sizes", {128, 256, 512},
       {proxy(8192, 20000, {0.06, 0.09, 0.17}, {0.2, 0.3, 0.45}),
-       proxy(40000, 50000, {0.03, 0.05, 0.11}, {0.1, 0.16, 0.3}),
+       proxy(40000, 45056, {0.03, 0.05, 0.11}, {0.1, 0.16, 0.3}),
        proxy(200000, 150000, {0.02, 0.03, 0.048}, {0.07, 0.1, 0.15})});
-  add("one size", {300}, {proxy(8192, 60000, {0.05}, {0.15})});
+  add("one size", {300}, {proxy(8192, 36000, {0.05}, {0.15})});
   add("none", {}, {});
   return cases;
 }
@@ -109,7 +109,7 @@ Json proxy_steps() {
   for (const int wanted : {0, 5, 16})
     for (const double px : {100.0, 600.0})
       for (const double bytes_s : {1e4, 3e4, 1e5, 2.5e5, 1e6, 2e7})
-        for (const double left_s : {0.0, 0.7, 4.5}) {
+        for (const double left_s : {0.0, 0.7, 4.5, 12.0}) {
           const auto step = proxy_step(m, wanted, px, {bytes_s, 0.04, left_s});
           entry["wanted_px_bytes_s_left_s_step"].push_back(
               {wanted, px, bytes_s, left_s, step ? Json(*step) : Json(-1)});
@@ -148,13 +148,14 @@ TEST(Vectors, Proxies) {
 }
 TEST(Vectors, StepsAreTakenOnSlowLinksAlone) {
   const Manifest m = stepped_manifest();
-  EXPECT_TRUE(proxy_step(m, 0, 600, {2.5e5, 0.04, 4.5}));  // 2 Mbit/s
-  EXPECT_FALSE(proxy_step(m, 0, 600, {2e7, 0.04, 4.5}));   // scales are there as soon
-  EXPECT_FALSE(proxy_step(m, 0, 600, {1e4, 0.04, 0.7}));   // no proxy comes in the time
+  EXPECT_TRUE(proxy_step(m, 0, 600, {2.5e5, 0.04, 12}));    // 2 Mbit/s
+  EXPECT_FALSE(proxy_step(m, 0, 600, {2.5e5, 0.04, 4.5}));  // the last picture would be worse
+  EXPECT_FALSE(proxy_step(m, 0, 600, {2e7, 0.04, 12}));     // scales are there as soon
+  EXPECT_FALSE(proxy_step(m, 0, 600, {1e4, 0.04, 0.7}));    // no proxy comes in the time
   EXPECT_FALSE(proxy_step(m, 0, 600, {2.5e5, 0.04, 0}));
   Manifest same = m;
   for (ManifestProxy& p : same.proxies) p.flip = {0.2, 0.2};
-  EXPECT_FALSE(proxy_step(same, 0, 600, {2.5e5, 0.04, 4.5}));  // none looks better
+  EXPECT_FALSE(proxy_step(same, 0, 600, {2.5e5, 0.04, 12}));  // none looks better
 }
 TEST(Vectors, HarmonicTime) {
   expect_cases("harmonic-time.json", harmonic_time(by_credit), [](Json& c) {

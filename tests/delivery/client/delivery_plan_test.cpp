@@ -12,14 +12,15 @@
 
 namespace texmesh::delivery_plan_test {
 
-constexpr std::uint64_t kMeshBytes = 100'000, kSmallBytes = 20'000, kLargeBytes = 60'000;
+constexpr std::uint64_t kMeshBytes = 100'000, kLargeMeshBytes = 1'000'000, kSmallBytes = 20'000,
+                        kLargeBytes = 60'000;
 
 /// make_package() with meshes of 100 kB and, where asked for, proxies of 20 and 60 kB: FLIP .04 and .02 at
-/// 128 px, .2 and .06 at 512 px, P95 three times that; or .9 and .6 everywhere, or 1. Scales lose 0, .1 and
-/// .2 at 128 px.
+/// 128 px, .2 and .06 at 512 px, P95 three times that; or .9 and .6 everywhere beside meshes of 1 MB, or 1.
+/// Scales lose 0, .1 and .2 at 128 px.
 enum class Proxies : std::uint8_t { kNone, kGood, kFair, kBad };
 Bytes make_package(Proxies proxies) {
-  const Bytes plain = testing::make_package(1, kMeshBytes);
+  const Bytes plain = testing::make_package(1, proxies == Proxies::kFair ? kLargeMeshBytes : kMeshBytes);
   if (proxies == Proxies::kNone) return plain;
   PackageReader package(open_container(memory_source(plain)));
   Manifest m = package.manifest();
@@ -187,8 +188,8 @@ TEST(DeliveryPlan, ALargerProxyComesOnTheWayOnASlowLink) {
   std::string seen;
   bool stepped = false;
   for (const double px : {300.0, 512.0})
-    for (const double bytes_s : {3e4, 6e4, 1e5, 1.5e5, 2e5, 3e5, 1e6, 1e8}) {
-      DeliveryRequest r = request(px, bytes_s, 4);
+    for (const double bytes_s : {3e4, 6e4, 1e5, 1.5e5, 2e5, 3e5, 5e5, 1e6, 1e8}) {
+      DeliveryRequest r = request(px, bytes_s, 8);
       const DeliveryPlan with = plan_delivery(package, r);
       r.proxy_steps = false;
       const DeliveryPlan without = plan_delivery(package, r);

@@ -11,7 +11,7 @@ Manifest two_proxies() {
   Manifest m;
   m.proxy_sizes_px = {128, 512};
   m.proxies = {{{"", 8192, 20000, {}}, 100, 60, 64, {0.04, 0.2}, {0.1, 0.5}},
-               {{"", 28224, 50000, {}}, 300, 200, 128, {0.02, 0.06}, {0.05, 0.2}}};
+               {{"", 28224, 40000, {}}, 300, 200, 128, {0.02, 0.06}, {0.05, 0.2}}};
   return m;
 }
 
@@ -50,7 +50,7 @@ TEST(ProxyChoice, TheSmallestThatCannotBeToldServes) {
   EXPECT_EQ(serving_proxy(m, 512), std::nullopt);
   EXPECT_EQ(serving_proxy(Manifest{}, 64), std::nullopt);
   Manifest large = m;  // scales come nearer than a larger file
-  for (ManifestProxy& p : large.proxies) p.glb.bytes += kMostServingBytes;
+  for (ManifestProxy& p : large.proxies) p.glb.bytes += kStartBytes;
   EXPECT_EQ(serving_proxy(large, 64), std::nullopt);
   Manifest by_p95 = m;  // the mean alone is not enough
   for (ManifestProxy& p : by_p95.proxies) p.flip_p95 = {0.16, 0.5};
@@ -60,7 +60,7 @@ TEST(ProxyChoice, TheSmallestThatCannotBeToldServes) {
 TEST(ProxyChoice, BytesBehindTheFirstRequest) {
   const Manifest m = two_proxies();
   EXPECT_EQ(proxy_bytes_beyond_start(m, 0), 0u);
-  EXPECT_EQ(proxy_bytes_beyond_start(m, 1), 28224 + 50000 - kStartBytes);
+  EXPECT_EQ(proxy_bytes_beyond_start(m, 1), 28224 + 40000 - kStartBytes);
 }
 
 }  // namespace texmesh::proxy_choice_test

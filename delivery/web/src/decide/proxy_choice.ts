@@ -1,6 +1,6 @@
 import { startBytes } from '../format/layout';
 import type { Manifest } from '../format/manifest';
-import { ln2, mostServingBytes, proxyLossPerDoubling, sameFlip, sameFlipP95 } from '../format/shared_numbers';
+import { ln2, proxyLossPerDoubling, sameFlip, sameFlipP95 } from '../format/shared_numbers';
 import { log, pow } from './portable_math';
 
 // Which proxies are enough, from the manifest alone: format/rules/proxy_choice.cpp, bit for bit.
@@ -34,7 +34,7 @@ export function proxyLoss({ proxies, proxySizesPx }: Manifest, proxy: number,
 export function servingProxy(manifest: Manifest, displayedPx: number): number {
   return manifest.proxies.findIndex(({ glb }, k) => {
     const { flip, flipP95 } = proxyLoss(manifest, k, displayedPx);
-    return flip <= sameFlip && flipP95 <= sameFlipP95 && glb.bytes <= mostServingBytes;
+    return flip <= sameFlip && flipP95 <= sameFlipP95 && glb.bytes <= startBytes;
   });
 }
 /** Bytes of begin .. end behind those that the first request has brought. */

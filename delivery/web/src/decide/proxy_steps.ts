@@ -20,9 +20,9 @@ export function documentBytes({ index, tables, scales }: Manifest): number {
 }
 
 /**
- * The proxy that comes in the first fifth of the time left and lowers the mean FLIP of what is seen in it by
- * at least a twentieth, of several the one that lowers it most; -1 where none does. What scales look like is
- * supposed, see SPEC.md, A.6.
+ * The proxy that comes in the first twentieth of the time left and lowers the mean FLIP of what is seen in
+ * that time by at least a twentieth, of several the one that lowers it most; -1 where none does. What scales
+ * look like is supposed, see SPEC.md, A.6.
  */
 export function proxyStep(m: Manifest, wanted: number, displayedPx: number,
     { bytesS, rttS, leftS }: StepLink): number {

@@ -107,12 +107,10 @@ export const proxyLossPerDoubling = 1.6;
 /** Lit pictures with at most these losses cannot be told from S_0's (SPEC.md, 5.5). */
 export const sameFlip = 0.05;
 export const sameFlipP95 = 0.15;
-/** Of a larger file scales come nearer, so a load does not end with it. */
-export const mostServingBytes = 100000;
 export const moments = 64; // at which the time left is looked at
 export const meshTimeShare = 0.5; // of the time left
 export const paying = 0.95; // of the mean without a step
-export const mostStepTime = 0.2; // of the time left: what comes later takes too much from the end
+export const mostStepTime = 0.05; // of the time left: what comes later takes too much from the end
 /** A coarser scale that is enough at any size stops just below, because the last step is always S_0's. */
 export const belowAny = 999000000;
 /** Keeps steps apart in the manifest's six digits. */
