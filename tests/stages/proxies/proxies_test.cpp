@@ -349,7 +349,7 @@ TEST(Proxies, TheyTakeLittleOfASmallSource) {
   const Mesh mesh = testing::bumpy_sphere(80, 160);
   for (const std::size_t bytes : {std::size_t{0}, std::size_t{60000}, std::size_t{600000}}) {
     const Proxies made =
-        proxies_of(with_source(noisy(mesh), bytes), {ProxyMode::kAuto, {10000, 20000, 45000}});
+        proxies_of(with_source(noisy(mesh), bytes), {ProxyMode::kAuto, {10000, 20000, 39000}});
     std::size_t sum = 0;
     for (const Proxy& proxy : made.proxies) sum += proxy.glb.size();
     constexpr double kMeshBytes = 75000;  // at most
