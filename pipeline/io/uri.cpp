@@ -144,6 +144,12 @@ Bytes decode_data_uri(std::string_view uri, std::uint64_t max_bytes, const std::
     throw InputError(file, place, "data:<type>;base64,<data>", shown(uri));
   }
   std::string_view text = uri.substr(comma + 1);
+  std::string plain;
+  if (text.find_first_of("% \t\r\n") != std::string_view::npos) {
+    plain = percent_decoded(text);
+    std::erase_if(plain, [](char c) { return c == ' ' || c == '\t' || c == '\r' || c == '\n'; });
+    text = plain;
+  }
   const std::size_t padded = text.size();
   while (!text.empty() && text.back() == '=' && padded - text.size() < 2) text.remove_suffix(1);
   // Unpadded text is accepted (RFC 4648, section 3.2; several exporters leave the padding out).

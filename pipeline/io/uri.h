@@ -32,7 +32,8 @@ std::string percent_encoded(const std::string& path);
 bool is_data_uri(std::string_view uri);
 
 /// The bytes of "data:[<type>];base64,<text>": padding, alphabet and the unused last bits are checked, as a
-/// hostile file must not mean two things. Throws InputError, also for more than max_bytes.
+/// hostile file must not mean two things. Escapes (%2B) and blanks in the text are as browsers read them.
+/// Throws InputError, also for more than max_bytes.
 Bytes decode_data_uri(std::string_view uri, std::uint64_t max_bytes, const std::string& file,
                       const std::string& place);
 

@@ -43,11 +43,18 @@ TEST(DataUri, DecodesEveryLength) {
   EXPECT_EQ(data("data:a/b;base64,+/+/"), "\xfb\xff\xbf");
 }
 
+TEST(DataUri, ReadsWrappedAndEscapedText) {
+  EXPECT_EQ(data("data:a/b;base64,Zm9v\r\nYg=\n=\n"), "foob");
+  EXPECT_EQ(data("data:a/b;base64, Zm 9v\tYg%3D%3d"), "foob");
+  EXPECT_EQ(data("data:a/b;base64,%2B/%2b%2F"), "\xfb\xff\xbf");
+}
+
 TEST(DataUri, RefusesWhatIsNotBase64) {
   for (const char* uri :
        {"data:a/b,foo", "data:a/b;base64", "data:", "data:a/b;base64,Z", "data:a/b;base64,Zg=",
         "data:a/b;base64,Zh==", "data:a/b;base64,Zg===", "data:a/b;base64,Z g=", "data:a/b;base64,Zm-v",
-        "data:a/b;base64,=", "data:a/b;base64,Zm=v", "dat:a/b;base64,Zm9v"}) {
+        "data:a/b;base64,=", "data:a/b;base64,Zm=v", "data:a/b;base64,Zm9%", "data:a/b;base64,Zm9%00",
+        "dat:a/b;base64,Zm9v"}) {
     EXPECT_THROW(data(uri), InputError) << uri;
   }
 }
