@@ -217,6 +217,9 @@ TEST(ImportGltf, LeavesOutPointsAndLinesWithANote) {
   const Model m = import(b);
   EXPECT_EQ(m.mesh.triangles.size(), 2u);
   EXPECT_TRUE(has_note(m, "skipped-primitive", Severity::kInfo));
+  b.json["meshes"][0]["primitives"].erase(0);
+  const std::string alone = testing::input_error([&] { import(b); });
+  EXPECT_NE(alone.find("expected triangles, found points and lines alone"), alone.npos) << alone;
 }
 
 TEST(ImportGltf, AppliesNodeTransformsDownTheTree) {
