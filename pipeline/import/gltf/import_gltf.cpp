@@ -489,6 +489,8 @@ void GltfReader::read() {
     }
   }
   assembler.finish();
+  if (model_.mesh.triangles.empty() && source_.lost.count("primitives of points and lines"))
+    source_.fail("/meshes", "triangles", "points and lines alone");
   read_materials(source_, document_, structure_, buffers_, materials, model_);
   drop_textures_without_uv();
 }

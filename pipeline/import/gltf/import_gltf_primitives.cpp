@@ -385,8 +385,8 @@ void PrimitiveReader::read_indices(VertexData& data) const {
   }
   const auto index = static_cast<std::size_t>(primitive_.indices);
   const std::string place = "/accessors/" + std::to_string(index);
-  if (model_.accessors[index].bufferView < 0)
-    source_.fail(place, "\"bufferView\", as for all indices", "an accessor without it");
+  if (model_.accessors[index].bufferView < 0 && !model_.accessors[index].sparse.isSparse)
+    source_.fail(place, "\"bufferView\" or \"sparse\" for indices", "an accessor without them");
   if (model_.accessors[index].count > max_indices) {
     source_.fail(place + "/count", "at most " + std::to_string(max_indices),
                  std::to_string(model_.accessors[index].count));

@@ -338,17 +338,21 @@ struct LoadedLibrary {
   MtlFile file;
   std::map<std::string, std::size_t> by_name;  // the first material so named
 
-  /// `name` as an OBJ uses it; what follows a blank and # may be a comment.
+  /// `name` as an OBJ uses it; what follows a blank and # may be a comment, here and in the library.
   const MtlMaterial* find(const std::string& wanted) const {
     auto it = by_name.find(wanted);
-    if (const std::size_t comment = wanted.find(" #"); it == by_name.end() && comment != wanted.npos)
-      it = by_name.find(std::string(trim(std::string_view(wanted).substr(0, comment))));
+    if (it == by_name.end()) it = by_name.find(without_comment(wanted));
     return it == by_name.end() ? nullptr : &file.materials[it->second];
   }
 
   LoadedLibrary(std::string library_name, MtlFile library_file)
       : name(std::move(library_name)), file(std::move(library_file)) {
     for (std::size_t i = 0; i < file.materials.size(); ++i) by_name.try_emplace(file.materials[i].name, i);
+    for (std::size_t i = 0; i < file.materials.size(); ++i)
+      by_name.try_emplace(without_comment(file.materials[i].name), i);
+  }
+  static std::string without_comment(std::string_view name) {
+    return std::string(trim(name.substr(0, name.find(" #"))));
   }
 };
 

@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "format/base/errors.h"
+#include "format/base/json_fields.h"
 
 namespace texmesh {
 namespace {
@@ -209,11 +210,11 @@ void PlyRows::next(PlyRow& row) {
 // Counts come as doubles: any type may hold one. `least_bytes_each` bounds what the rest of the
 // file can hold.
 std::size_t PlyRows::list_count(double count, std::size_t least_bytes_each) const {
-  const double most = static_cast<double>(left() / least_bytes_each + 1);
-  if (!(count >= 0) || count > most || count != std::floor(count))
-    throw InputError(file_, place(),
-                     "a list length from 0 to " + std::to_string(static_cast<std::uint64_t>(most)),
-                     std::isfinite(count) ? std::to_string(static_cast<long double>(count)) : "no number");
+  if (!(count >= 0) || count != std::floor(count))
+    throw InputError(file_, place(), "a list length, 0 or more", shortest_text(count));
+  if (count > static_cast<double>(left() / least_bytes_each + 1))
+    throw InputError(file_, place(), "a list of " + shortest_text(count) + " numbers",
+                     std::to_string(left()) + " bytes left in the file, which is cut off or damaged");
   return static_cast<std::size_t>(count);
 }
 

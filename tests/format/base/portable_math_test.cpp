@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstdio>
 
 namespace texmesh::portable_math_test {
 
@@ -32,5 +33,12 @@ TEST(PortableMath, Limits) {
   EXPECT_EQ(portable::cos(0), 1);
   EXPECT_EQ(portable::atan2(0, 0), 0);
 }
+
+#if defined(__SANITIZE_ADDRESS__)
+TEST(Sanitizers, ANumberThatNoIntegerHoldsEndsTheProgram) {
+  const volatile double far = 1e30;
+  EXPECT_DEATH(std::printf("%d", static_cast<int>(far)), "outside the range of representable values");
+}
+#endif
 
 }  // namespace texmesh::portable_math_test

@@ -173,6 +173,17 @@ TEST(ImportGltf, ReadsSparseAccessors) {
   EXPECT_EQ(import(b).mesh.positions, (std::vector<Vec3f>{{0, 0, 0}, {7, 8, 9}, {0, 0, 0}, {10, 11, 12}}));
 }
 
+TEST(ImportGltf, ReadsSparseIndices) {
+  GltfBuilder b = quad();
+  const int at = b.view_of<std::uint8_t>({1, 2, 4, 5});
+  const int values = b.view_of<std::uint16_t>({1, 2, 2, 3});
+  b.json["accessors"][2].erase("bufferView");  // glTF-Transform writes it so: most are zero
+  b.json["accessors"][2]["sparse"] = {{"count", 4},
+                                      {"indices", {{"bufferView", at}, {"componentType", 5121}}},
+                                      {"values", {{"bufferView", values}}}};
+  EXPECT_EQ(import(b).mesh.triangles, import(quad()).mesh.triangles);
+}
+
 TEST(ImportGltf, ReadsStripsFansAndUnindexedPrimitives) {
   GltfBuilder b;
   const int positions = b.attribute<float>({0, 0, 0, 1, 0, 0, 0, 1, 0, 1, 1, 0, 0, 2, 0}, "VEC3");
@@ -206,6 +217,9 @@ TEST(ImportGltf, LeavesOutPointsAndLinesWithANote) {
   const Model m = import(b);
   EXPECT_EQ(m.mesh.triangles.size(), 2u);
   EXPECT_TRUE(has_note(m, "skipped-primitive", Severity::kInfo));
+  b.json["meshes"][0]["primitives"].erase(0);
+  const std::string alone = testing::input_error([&] { import(b); });
+  EXPECT_NE(alone.find("expected triangles, found points and lines alone"), alone.npos) << alone;
 }
 
 TEST(ImportGltf, AppliesNodeTransformsDownTheTree) {

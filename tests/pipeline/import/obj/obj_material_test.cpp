@@ -38,6 +38,18 @@ TEST(ObjMaterial, LibrariesWithBlanksAndSeveralInOneLine) {
   EXPECT_EQ(count_notes(half, "missing-material"), 1);
 }
 
+TEST(ObjMaterial, CommentsBehindNamesOfMaterials) {
+  const std::string mtl = "newmtl m # the skin\nKd 0 1 0\nnewmtl n #1\nKd 1 0 0\nnewmtl n\n";
+  for (const auto& [name, green] : {std::pair("m", 1), {"m # used", 1}, {"n #1", 0}, {"n #2", 1}}) {
+    MemoryResolver resolver;
+    resolver.files["a.mtl"] = bytes_of(mtl);
+    const Model model =
+        import_text("mtllib a.mtl\n" + kVertices + "usemtl " + name + "\nf 1 2 3\n", resolver);
+    EXPECT_EQ(count_notes(model, "missing-material"), 0) << name;
+    EXPECT_EQ(model.materials[0].base_colour.y, static_cast<float>(green)) << name;
+  }
+}
+
 TEST(ObjMaterial, TextureNamesWithBlanksOptionsAndTrailingBlanks) {
   for (const char* line : {"map_Kd a b.png", "map_Kd   a b.png \t", "map_Kd -s 1 1 1 -o 0 0 0 a b.png",
                            "map_Kd -clamp on a b.png", "map_Kd -blendu on -mm 0 1 -texres 512 a b.png\r",

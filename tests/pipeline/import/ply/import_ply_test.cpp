@@ -295,6 +295,16 @@ TEST(ImportPly, FaultsNameLineExpectedAndFound) {
   EXPECT_NE(error.find("\"one\""), std::string::npos) << error;
 }
 
+TEST(ImportPly, AListThatTheFileEndsInIsTold) {
+  const std::string cut = input_error([] { import(kSquare.substr(0, kSquare.size() - 7)); });
+  EXPECT_NE(cut.find("a list of 3 numbers, found 0 bytes left in the file, which is cut off"), cut.npos)
+      << cut;
+  std::string text = kSquare;
+  text.replace(text.find("3 0 1 2"), 7, "-3 0 1 2");
+  const std::string negative = input_error([&] { import(text); });
+  EXPECT_NE(negative.find("a list length, 0 or more, found -3"), negative.npos) << negative;
+}
+
 TEST(ImportPly, BadHeadersAndNoFaces) {
   for (const char* text :
        {"ply", "ply\n", "ply\nend_header\n", "ply\nformat ascii 2.0\nend_header\n",
