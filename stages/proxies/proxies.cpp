@@ -230,7 +230,7 @@ class ProxySizes {
         surfaces_(subject.mesh, subject.groups, kLeastTriangles, most_triangles(subject.mesh, sizes.back()),
                   context),
         middle_(reference_views(subject.mesh, subject.shown, kMiddlePx, context)),
-        large_(reference_views(subject.mesh, subject.shown, kLargePx, context)),
+        large_(reference_views(subject.mesh, subject.shown, kLargePx, context, 2)),
         scales_(source, sizes.back()),
         competitors_(source.scales, subject.shown, middle_) {}
 
@@ -247,13 +247,15 @@ class ProxySizes {
     return picture_loss(views, made.shown.scene(), made.shown.shown.textures, context_);
   }
   Candidate best_candidate(int bytes);
+  bool is_nearer(const Candidate& a, const Candidate& b);
   const char* why_not(const Candidate& best, const FlipSum& large);
   bool scales_compete() const { return subject_.mode == ProxyMode::kAuto; }
 
   const ProxySubject& subject_;
   const RunContext& context_;
   CoarseSurfaces surfaces_;
-  const ReferenceViews middle_, large_;
+  const ReferenceViews middle_, large_;        // large ones of half of the rows
+  std::optional<ReferenceViews> whole_large_;  // where these leave doubt
   WholeScales scales_;
   CompetingScales competitors_;
   std::vector<KeptProxy> kept_;
@@ -285,7 +287,16 @@ Candidate ProxySizes::best_candidate(int bytes) {
   if (!scale.made) return baked;
   baked.kind = ProxyKind::kBakedBeatsScale;
   scale.large = flip_of(*scale.made, large_), baked.large = flip_of(*baked.made, large_);
-  return scale.large->mean() < baked.large->mean() ? std::move(scale) : std::move(baked);
+  return is_nearer(scale, baked) ? std::move(scale) : std::move(baked);
+}
+
+/// By large pictures, by whole ones where their halves differ little.
+bool ProxySizes::is_nearer(const Candidate& a, const Candidate& b) {
+  constexpr double kPlainly = 1.1;
+  const double in_a = a.large->mean(), in_b = b.large->mean();
+  if (std::max(in_a, in_b) >= kPlainly * std::min(in_a, in_b)) return in_a < in_b;
+  if (!whole_large_) whole_large_ = reference_views(subject_.mesh, subject_.shown, kLargePx, context_);
+  return flip_of(*a.made, *whole_large_).mean() < flip_of(*b.made, *whole_large_).mean();
 }
 
 /// Why the candidate does not stay; null where it does. Plans code a scale's texels apart and pay for tables,
@@ -336,8 +347,8 @@ std::vector<Proxy> measured_proxies(const ProxySubject& subject, std::vector<Kep
   for (KeptProxy& k : kept) out.push_back(std::move(k.made.proxy));
   ReferenceViews small, huge;
   if (!kept.empty()) {
-    small = reference_views(subject.mesh, subject.shown, kSmallPx, context);
-    huge = reference_views(subject.mesh, subject.shown, kHugePx, context, true);
+    small = reference_views(subject.mesh, subject.shown, kSmallPx, context, 2);
+    huge = reference_views(subject.mesh, subject.shown, kHugePx, context, 4);
   }
   for (std::size_t i = 0; i < kept.size(); ++i) {
     const ShownModel& shown = kept[i].made.shown;
