@@ -42,7 +42,7 @@ struct FlipSum {
 /// replicated. Both pictures have one size. Same bits on every machine.
 FlipSum compare_flip(const FlipPicture& reference, const FlipPicture& test);
 /// The same bits, of a picture that is compared once: filtered where one of the two covers pixels. `spans`:
-/// shown_spans() of the picture.
+/// shown_spans() of the picture, or more of it.
 FlipSum compare_flip(const FlipPicture& reference, const Picture& test, const PixelSpans& spans);
 FlipSum compare_flip(const FlipPicture& reference, const Picture& test);
 /// The same of every pixel, row by row; 0 where neither picture shows the object.

@@ -85,15 +85,20 @@ using Lines = std::array<const float*, 2 * kFilterReach + 1>;
 }  // namespace
 
 PixelSpans shown_spans(const Picture& picture) {
+  std::vector<PixelSpans::Row> shown(picture.side_px);
+  for (std::size_t y = 0; y < shown.size(); ++y) shown[y] = shown_columns(picture, y);
+  return spans_around(shown);
+}
+
+PixelSpans spans_around(const std::vector<PixelSpans::Row>& columns) {
   constexpr std::uint32_t kReach = kFilterReach;
   PixelSpans spans;
-  spans.side_px = picture.side_px;
-  std::vector<PixelSpans::Row> shown(picture.side_px);
-  for (std::size_t y = 0; y < shown.size(); ++y) {
-    PixelSpans::Row& row = shown[y] = shown_columns(picture, y);
+  spans.side_px = static_cast<std::uint32_t>(columns.size());
+  std::vector<PixelSpans::Row> shown = columns;
+  for (PixelSpans::Row& row : shown) {
     if (row.first == row.last) continue;
     row.first = std::max(row.first, kReach) - kReach;
-    row.last = std::min(row.last + kReach, picture.side_px);
+    row.last = std::min(row.last + kReach, spans.side_px);
   }
   spans.rows.resize(shown.size());
   for (std::size_t y = 0; y < shown.size(); ++y)

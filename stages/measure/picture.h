@@ -29,6 +29,8 @@ struct PixelSpans {
 };
 /// Plain background is what the corner's colour shows and is not covered.
 PixelSpans shown_spans(const Picture& picture);
+/// Around what rows show: of each the columns that are not plain, or none.
+PixelSpans spans_around(const std::vector<PixelSpans::Row>& shown);
 /// Per row what holds both.
 PixelSpans union_of(const PixelSpans& a, const PixelSpans& b);
 

@@ -231,7 +231,7 @@ class ProxySizes {
         surfaces_(subject.mesh, subject.groups, kLeastTriangles, most_triangles(subject.mesh, sizes.back()),
                   context),
         middle_(reference_views(subject.mesh, subject.shown, kMiddlePx, context)),
-        large_(reference_views(subject.mesh, subject.shown, kLargePx, context)),
+        large_(reference_views(subject.mesh, subject.shown, kLargePx, context, 2)),
         scales_(source, sizes.back()),
         competitors_(source.scales, subject.shown, middle_) {}
 
@@ -248,13 +248,15 @@ class ProxySizes {
     return picture_loss(views, made.shown.scene(), made.shown.shown.textures, context_);
   }
   Candidate best_candidate(int bytes);
+  bool is_nearer(const Candidate& a, const Candidate& b);
   const char* why_not(const Candidate& best, const FlipSum& large);
   bool scales_compete() const { return subject_.mode == ProxyMode::kAuto; }
 
   const ProxySubject& subject_;
   const RunContext& context_;
   CoarseSurfaces surfaces_;
-  const ReferenceViews middle_, large_;
+  const ReferenceViews middle_, large_;        // large ones of half of the rows
+  std::optional<ReferenceViews> whole_large_;  // where these leave doubt
   WholeScales scales_;
   CompetingScales competitors_;
   std::vector<KeptProxy> kept_;
@@ -286,8 +288,17 @@ Candidate ProxySizes::best_candidate(int bytes) {
   if (!scale.made) return baked;
   baked.kind = ProxyKind::kBakedBeatsScale;
   scale.large = flip_of(*scale.made, large_), baked.large = flip_of(*baked.made, large_);
-  const auto loss = [](const Candidate& c) { return c.flip.mean() * c.large->mean(); };
-  return loss(scale) < loss(baked) ? std::move(scale) : std::move(baked);
+  return is_nearer(scale, baked) ? std::move(scale) : std::move(baked);
+}
+
+/// By middle and large pictures, by whole large ones where halves of them leave doubt.
+bool ProxySizes::is_nearer(const Candidate& a, const Candidate& b) {
+  constexpr double kPlainly = 1.1, kLeast = 1e-9;
+  const double of_middle = (a.flip.mean() + kLeast) / (b.flip.mean() + kLeast);
+  const double ratio = of_middle * (a.large->mean() + kLeast) / (b.large->mean() + kLeast);
+  if (std::max(ratio, 1 / ratio) >= kPlainly) return ratio < 1;
+  if (!whole_large_) whole_large_ = reference_views(subject_.mesh, subject_.shown, kLargePx, context_);
+  return of_middle * flip_of(*a.made, *whole_large_).mean() < flip_of(*b.made, *whole_large_).mean();
 }
 
 /// Why the candidate does not stay; null where it does. Plans code a scale's texels apart and pay for tables,
@@ -338,8 +349,8 @@ std::vector<Proxy> measured_proxies(const ProxySubject& subject, std::vector<Kep
   for (KeptProxy& k : kept) out.push_back(std::move(k.made.proxy));
   ReferenceViews small, huge;
   if (!kept.empty()) {
-    small = reference_views(subject.mesh, subject.shown, kSmallPx, context);
-    huge = reference_views(subject.mesh, subject.shown, kHugePx, context, true);
+    small = reference_views(subject.mesh, subject.shown, kSmallPx, context, 2);
+    huge = reference_views(subject.mesh, subject.shown, kHugePx, context, 4);
   }
   for (std::size_t i = 0; i < kept.size(); ++i) {
     const ShownModel& shown = kept[i].made.shown;

@@ -49,7 +49,8 @@ struct ProxiesOptions {
 ///   smallest one lies with a manifest of 8 kB in the 45,056 bytes of a client's first request.
 /// - Losses: FLIP of lit pictures beside S_0's (stages/render in the studio's light) at four displayed
 ///   heights, where the height is that of the bounding box's longest side; four views, at 512 px two, at
-///   1,024 px a quarter of the rows of one.
+///   1,024 px one. All rows are looked at at 256 px, which choices go by, half at 128 and 512 px, a quarter
+///   at 1,024 px.
 /// - Automatic choice, each size by itself: a baked one is left out where plans show something better for the
 ///   bytes. The smallest one is compared with scales of 55 % of its bytes, in which Draco codes as much, and
 ///   it stays where a larger one does, which clients cannot show at once. Where it wins, larger ones are

@@ -181,11 +181,10 @@ class GroupPictures {
     for (std::size_t v = 0; v < seen_.size(); ++v) {
       const PictureVariants pictures =
           shade_variants(scene, seen_[v], variants, all_, views_.environment, context_);
+      const PixelSpans spans = pictures.spans();
       Picture picture;
-      for (std::size_t p = 0; p < plans.size(); ++p) {
-        pictures.put(p, picture);
-        sums[p].add(compare_flip(views_.views[v].picture, prepare_flip(picture)));
-      }
+      for (std::size_t p = 0; p < plans.size(); ++p)
+        sums[p].add(views_.views[v].loss_of(pictures, p, spans, picture));
     }
     for (std::size_t p = 0; p < plans.size(); ++p) plans[p].loss = squared(sums[p].mean());
   }

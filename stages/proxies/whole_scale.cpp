@@ -82,7 +82,7 @@ WholeScales::WholeScales(const WholeScaleSource& source, double most_bytes)
 
 void WholeScales::measure(const RunContext& context) {
   if (curves_) return;
-  views_ = reference_views(source_.mesh, source_.shown, kLargePx, context, true);
+  views_ = reference_views(source_.mesh, source_.shown, kLargePx, context, 4);
   curves_.emplace(source_.mesh, textures_, *views_, most_bytes_, context);
 }
 

@@ -29,13 +29,17 @@ struct ReferenceViews {
     Visibility seen(const RenderScene& scene, const RunContext& context) const {
       return look(scene, camera, side_px, context, bands);
     }
+    /// What one of the pictures of seen() differs by. `spans`: theirs; `picture`: empty, or what the last
+    /// call has left.
+    FlipSum loss_of(const PictureVariants& pictures, std::size_t variant, const PixelSpans& spans,
+                    Picture& picture) const;
   };
   RenderEnvironment environment;
   std::vector<View> views;
 };
-/// `quarter`: only a quarter of the rows is there, spread over the pictures.
+/// `one_of`: only one of so many bands of rows is there, others in each view; at most 4.
 ReferenceViews reference_views(const Mesh& mesh, const ShownMaterials& shown, double displayed_px,
-                               const RunContext& context, bool quarter = false);
+                               const RunContext& context, std::uint32_t one_of = 1);
 
 /// What pictures of the scene from the same places differ by. Half of the views will do where their mean is
 /// more than `hopeless`.

@@ -187,6 +187,20 @@ void PictureVariants::put(std::size_t variant, Picture& picture) const {
   }
 }
 
+PixelSpans PictureVariants::spans() const {
+  std::vector<PixelSpans::Row> rows(side_px_);
+  // Filters take the corner for the background.
+  const bool all = !places_.empty() && places_.front() == 0;
+  if (all) rows.assign(side_px_, {0, side_px_, 0});
+  for (std::size_t i = 0; i < places_.size() && !all; ++i) {
+    PixelSpans::Row& row = rows[places_[i] / side_px_];
+    const std::uint32_t x = places_[i] % side_px_;
+    if (row.first == row.last) row.first = x;
+    row.last = x + 1;
+  }
+  return spans_around(rows);
+}
+
 PictureVariants shade_variants(const RenderScene& scene, const Visibility& visibility,
                                std::span<const std::vector<RenderMaterial>* const> variants,
                                const std::vector<RenderTexture>& textures,

@@ -32,6 +32,8 @@ class PictureVariants {
   /// The same in place of another of these pictures, or of an empty one: what both show of the background
   /// stays.
   void put(std::size_t variant, Picture& picture) const;
+  /// Of all these pictures at once: what shown_spans() finds in one, or more.
+  PixelSpans spans() const;
 
   /// Places of the shown pixels in the pictures, rising.
   const std::vector<std::uint32_t>& places() const { return places_; }

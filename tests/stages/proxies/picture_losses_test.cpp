@@ -31,6 +31,19 @@ TEST(PictureLoss, S0ItselfHasNoLossAndAnotherColourHasOne) {
   }
 }
 
+TEST(PictureLoss, APartOfTheRowsTellsWhatAllTell) {
+  const ShownModel source = plain_model(testing::sphere(20, 40), {0.5f, 0.5f, 0.5f, 1}),
+                   red = plain_model(source.mesh, {0.7f, 0.4f, 0.4f, 1});
+  for (const auto& [px, one_of] : {std::pair{kSmallPx, 2u}, {kLargePx, 2u}, {kLargePx, 4u}, {kHugePx, 4u}}) {
+    const auto loss = [&](std::uint32_t rows) {
+      return picture_loss(reference_views(source.mesh, source.shown, px, {}, rows), red.scene(), {}, {});
+    };
+    const FlipSum all = loss(1), part = loss(one_of);
+    EXPECT_LT(static_cast<double>(part.pixels) * one_of, 0.9 * static_cast<double>(all.pixels));
+    EXPECT_NEAR(part.mean() / all.mean(), 1, 0.02) << px << " " << one_of;
+  }
+}
+
 TEST(PictureLoss, HalfOfTheViewsWillDoForWhatIsHopeless) {
   const ShownModel source = plain_model(testing::sphere(20, 40), {0.5f, 0.5f, 0.5f, 1});
   const ReferenceViews views = reference_views(source.mesh, source.shown, kMiddlePx, {});

@@ -66,11 +66,12 @@ void expect_as_alone(const SmallScene& scene, const std::vector<Materials>& vari
                      const RunContext& context) {
   const RenderEnvironment studio = studio_environment();
   const RenderScene shown = render_scene(scene.mesh, scene.materials, scene.textures.size());
-  const Visibility seen = look(shown, perspective_camera(camera_of(1, 4, {}, 1)), 24, {});
+  const Visibility seen = look(shown, perspective_camera(camera_of(1, 4, {}, 1.5)), 48, {});
   std::vector<const Materials*> lists;
   for (const Materials& m : variants) lists.push_back(&m);
   const PictureVariants pictures = shade_variants(shown, seen, lists, scene.textures, studio, context);
   ASSERT_EQ(pictures.count(), variants.size());
+  const FlipPicture first = prepare_flip(pictures.picture(0));
   for (std::size_t v = 0; v < variants.size(); ++v) {
     const RenderScene alone = render_scene(scene.mesh, variants[v], scene.textures.size());
     const Picture expected = shade(alone, seen, scene.textures, studio, {});
@@ -78,6 +79,10 @@ void expect_as_alone(const SmallScene& scene, const std::vector<Materials>& vari
     EXPECT_EQ(picture.side_px, expected.side_px);
     EXPECT_EQ(picture.linear, expected.linear) << v;
     EXPECT_EQ(picture.covered, expected.covered) << v;
+    const FlipSum in_spans = compare_flip(first, picture, pictures.spans()),
+                  whole = compare_flip(first, picture);
+    EXPECT_EQ(in_spans.sum, whole.sum) << v;
+    EXPECT_EQ(in_spans.pixels, whole.pixels) << v;
   }
 }
 
