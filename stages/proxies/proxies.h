@@ -7,7 +7,7 @@
 
 namespace texmesh {
 
-inline constexpr int kProxiesVersion = 15;
+inline constexpr int kProxiesVersion = 16;
 
 /// kAuto: only those that look better than what plans show for the same bytes.
 enum class ProxyMode : std::uint8_t { kNone, kAuto, kAlways };

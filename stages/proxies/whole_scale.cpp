@@ -1,6 +1,6 @@
 // A scale as a proxy. Its story:
 // 1. Pictures of S_0 at kLargePx, a quarter of the rows, tell what each image loses in several sizes and
-// qualities, with everything else at its best (TextureCurves), and what scales lose with whole images.
+// qualities, with everything else at its best (TextureCurves), and what some scales lose with whole images.
 // 2. What a mesh loses by its coding, and the bytes that this takes, are known from other scans
 // (kScaleFineness).
 // 3. Losses in the same pixels join about as the sum of their squares. So for every number of bytes the mesh
@@ -86,13 +86,28 @@ void WholeScales::measure(const RunContext& context) {
   curves_.emplace(source_.mesh, textures_, *views_, most_bytes_, context);
 }
 
-double WholeScales::loss_of(std::size_t scale, const RunContext& context) {
-  const auto [at, is_new] = scale_losses_.try_emplace(scale, 0.0);
+double WholeScales::flip_of(std::size_t scale, const RunContext& context) {
+  const auto [at, is_new] = scale_flips_.try_emplace(scale, 0.0);
   if (!is_new || scale <= source_.stand_in) return at->second;
   const Mesh mesh = lit_scale(source_.scales, scale, frames_of(scale, context));
   const RenderScene scene = render_scene(mesh, source_.shown.materials, source_.shown.textures.size());
-  const double flip = picture_loss(*views_, scene, source_.shown.textures, context).mean();
-  return at->second = flip * flip;
+  return at->second = picture_loss(*views_, scene, source_.shown.textures, context).mean();
+}
+
+/// A square of FLIP. Between scales that pictures are made of it grows evenly as the bytes fall: of a
+/// saxophone 3 % off. The finest of them is S_0's neighbour, which is not as near as S_0 tells.
+double WholeScales::loss_of(std::size_t scale, const RunContext& context) {
+  constexpr double kApart = 1.5;  // times the bytes
+  if (scale <= source_.stand_in) return 0;
+  std::size_t finer = source_.stand_in + 1, coarser = finer;
+  for (std::size_t k = finer; coarser < scale && k < estimates_.size(); ++k)
+    if (k + 1 == estimates_.size() || estimates_[k] * kApart <= estimates_[coarser])
+      finer = std::exchange(coarser, k);
+  if (coarser == scale) finer = coarser;
+  double flip = flip_of(finer, context);
+  if (const double whole = portable::log(estimates_[finer] / estimates_[coarser]); whole > 0)
+    flip += (flip_of(coarser, context) - flip) * portable::log(estimates_[finer] / estimates_[scale]) / whole;
+  return flip * flip;
 }
 
 double WholeScales::mesh_bytes(const MeshChoice& mesh) const {
@@ -100,7 +115,15 @@ double WholeScales::mesh_bytes(const MeshChoice& mesh) const {
   return document_bytes_ + of_estimate_ * kScaleFineness[mesh.coding].bytes * estimates_[mesh.scale];
 }
 
-std::optional<WholeScales::Choice> WholeScales::best_with(std::size_t scale, double bytes,
+/// At least that of a finer one that has been looked at.
+double WholeScales::least_loss_of(std::size_t scale) const {
+  const auto behind = scale_flips_.upper_bound(scale);
+  const double flip = behind == scale_flips_.begin() ? 0 : std::prev(behind)->second;
+  return flip * flip;
+}
+
+/// A scale that cannot keep to the loss is not looked at, and has more.
+std::optional<WholeScales::Choice> WholeScales::best_with(std::size_t scale, double bytes, double most_loss,
                                                           const RunContext& context) {
   std::optional<Choice> best;
   for (std::size_t c = 0; c < kCodings; ++c) {
@@ -110,7 +133,9 @@ std::optional<WholeScales::Choice> WholeScales::best_with(std::size_t scale, dou
     const double loss = kScaleFineness[c].loss + textures->loss;
     if (!best || loss < best->loss) best = Choice{mesh, std::move(*textures), loss};
   }
-  if (best) best->loss += loss_of(scale, context);
+  if (!best) return best;
+  const double least = least_loss_of(scale);
+  best->loss += best->loss + least > most_loss ? least : loss_of(scale, context);
   return best;
 }
 
@@ -119,7 +144,8 @@ std::optional<WholeScales::Choice> WholeScales::choose(double bytes, const RunCo
   const std::size_t count = source_.scales.scales.size();
   std::size_t start = 0;
   while (start + 1 < count && mesh_bytes({start, 1}) > bytes / 2) ++start;
-  std::optional<Choice> best = best_with(start, bytes, context);
+  constexpr double kAny = std::numeric_limits<double>::infinity();
+  std::optional<Choice> best = best_with(start, bytes, kAny, context);
   for (const bool finer : {true, false}) {
     constexpr int kMostWorse = 2;  // S_0 is nearer than its neighbours tell
     int worse = 0;
@@ -129,7 +155,7 @@ std::optional<WholeScales::Choice> WholeScales::choose(double bytes, const RunCo
       const double ratio = finer ? estimates_[k] / estimates_[last] : estimates_[last] / estimates_[k];
       if (ratio < kOtherScale && k != 0) continue;
       last = k;
-      std::optional<Choice> found = best_with(k, bytes, context);
+      std::optional<Choice> found = best_with(k, bytes, best ? best->loss : kAny, context);
       if (!found && finer) break;
       if (found && (!best || found->loss < best->loss))
         best = std::move(found), worse = 0;

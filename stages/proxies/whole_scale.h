@@ -39,9 +39,12 @@ class WholeScales {
     double loss = 0;
   };
   void measure(const RunContext& context);
+  double flip_of(std::size_t scale, const RunContext& context);
   double loss_of(std::size_t scale, const RunContext& context);
   double mesh_bytes(const MeshChoice& mesh) const;
-  std::optional<Choice> best_with(std::size_t scale, double bytes, const RunContext& context);
+  double least_loss_of(std::size_t scale) const;
+  std::optional<Choice> best_with(std::size_t scale, double bytes, double most_loss,
+                                  const RunContext& context);
   std::optional<Choice> choose(double bytes, const RunContext& context);
   const ScaleFrames& frames_of(std::size_t scale, const RunContext& context);
   ScaleCoding coding_of(const MeshChoice& mesh, const RunContext& context);
@@ -64,7 +67,7 @@ class WholeScales {
   double scans_share_ = 0.95;  // of the bytes of one scan, what images of several take
   std::optional<ReferenceViews> views_;
   std::optional<TextureCurves> curves_;
-  std::map<std::size_t, double> scale_losses_;                 // squares of FLIP, by scale
+  std::map<std::size_t, double> scale_flips_;                  // of those looked at, by scale
   std::optional<std::pair<std::size_t, ScaleFrames>> frames_;  // of the scale that was last asked for
   std::map<MeshChoice, double> file_bytes_;                    // of files without images
   std::vector<double> estimates_;                              // of meshes' bytes, by scale
