@@ -100,6 +100,51 @@ Affine local_map(const Source& source, const tinygltf::Node& node, std::size_t i
   return a;
 }
 
+constexpr std::size_t kMostInstances = 1'000'000;  // as many as nodes may be
+
+/// The copies of a node's mesh that EXT_mesh_gpu_instancing asks for, as maps to the node's space; without it
+/// the mesh itself. InputError where their attributes do not fit together.
+std::vector<Affine> copies_of(const Source& source, const GltfJson& document, const tinygltf::Model& model,
+                              Buffers& buffers, std::size_t n) {
+  static const GltfJson::json_pointer at("/extensions/EXT_mesh_gpu_instancing/attributes");
+  const GltfJson& node = document["nodes"][n];
+  const std::string place = "/nodes/" + std::to_string(n) + at.to_string();
+  struct Part {
+    std::vector<double> tinygltf::Node::*member;
+    AccessorReader values;
+  };
+  std::vector<Part> parts;
+  for (const auto& [name, components, member] :
+       {std::tuple{"TRANSLATION", 3, &tinygltf::Node::translation},
+        {"ROTATION", 4, &tinygltf::Node::rotation},
+        {"SCALE", 3, &tinygltf::Node::scale}}) {
+    if (!node.contains(at / name)) continue;
+    const AccessorReader values(source, model, buffers, node.at(at / name).get<std::size_t>());
+    if (values.components() != components)
+      source.fail(place + "/" + name, std::to_string(components) + " numbers for each copy",
+                  std::to_string(values.components()));
+    const std::size_t expected = parts.empty() ? std::min(values.count(), kMostInstances) : parts[0].values.count();
+    if (values.count() != expected)
+      source.fail(place + "/" + name, (parts.empty() ? "at most " : "") + std::to_string(expected) + " copies",
+                  std::to_string(values.count()));
+    parts.push_back({member, values});
+  }
+  if (parts.empty()) return {Affine()};
+  std::vector<Affine> out(parts[0].values.count());
+  for (std::size_t i = 0; i < out.size(); ++i) {
+    tinygltf::Node copy;
+    for (const Part& part : parts) {
+      std::array<float, 4> v{};
+      part.values.read(i, v.data());
+      if (!std::ranges::all_of(v, [](float x) { return std::isfinite(x); }))
+        source.fail(place, "finite numbers", "others in copy " + std::to_string(i));
+      (copy.*part.member).assign(v.begin(), v.begin() + part.values.components());
+    }
+    out[i] = local_map(source, copy, n);
+  }
+  return out;
+}
+
 std::vector<int> scene_roots(const Source& source, const tinygltf::Model& model) {
   if (!model.scenes.empty()) {
     const auto scene = static_cast<std::size_t>(std::max(model.defaultScene, 0));
@@ -124,7 +169,8 @@ std::vector<int> scene_roots(const Source& source, const tinygltf::Model& model)
 
 /// The instances of the scene that is read, depth first in the order of the file. InputError when the nodes
 /// are no tree.
-std::vector<Instance> find_instances(const Source& source, const tinygltf::Model& model) {
+std::vector<Instance> find_instances(const Source& source, const GltfJson& document,
+                                     const tinygltf::Model& model, Buffers& buffers) {
   // No recursion: a chain may be as long as the file allows.
   struct Pending {
     int node;
@@ -146,10 +192,17 @@ std::vector<Instance> find_instances(const Source& source, const tinygltf::Model
     seen[n] = true;
     const tinygltf::Node& node = model.nodes[n];
     const Affine local = local_map(source, node, n), to_scene = p.to_scene * local;
-    const double shift =
-        std::max({std::fabs(local.at(0, 3)), std::fabs(local.at(1, 3)), std::fabs(local.at(2, 3))});
-    const double rounding = std::max(p.rounding, growth(p.to_scene) * float_unit(shift));
-    if (node.mesh >= 0) found.push_back({n, static_cast<std::size_t>(node.mesh), to_scene, rounding});
+    const auto rounding_of = [](const Affine& outer, const Affine& a) {
+      return growth(outer) *
+             float_unit(std::max({std::fabs(a.at(0, 3)), std::fabs(a.at(1, 3)), std::fabs(a.at(2, 3))}));
+    };
+    const double rounding = std::max(p.rounding, rounding_of(p.to_scene, local));
+    if (found.size() > kMostInstances)
+      source.fail("/nodes", "at most " + std::to_string(kMostInstances) + " shown meshes", "more");
+    if (node.mesh >= 0)
+      for (const Affine& copy : copies_of(source, document, model, buffers, n))
+        found.push_back({n, static_cast<std::size_t>(node.mesh), to_scene * copy,
+                         std::max(rounding, rounding_of(to_scene, copy))});
     for (auto c = node.children.rbegin(); c != node.children.rend(); ++c)
       stack.push_back({*c, to_scene, rounding});
   }
@@ -349,10 +402,11 @@ class GltfReader {
 };
 
 bool is_supported(const std::string& extension) {
-  static constexpr std::array<std::string_view, 9> kSupported{
+  static constexpr std::array<std::string_view, 10> kSupported{
       "KHR_draco_mesh_compression", "KHR_mesh_quantization", "EXT_meshopt_compression",
       "KHR_meshopt_compression",    "KHR_texture_transform", "EXT_texture_webp",
-      "EXT_texture_avif",           "KHR_texture_basisu",    "KHR_materials_unlit"};
+      "EXT_texture_avif",           "KHR_texture_basisu",    "KHR_materials_unlit",
+      "EXT_mesh_gpu_instancing"};
   return find_material_extension(extension) ||
          std::find(kSupported.begin(), kSupported.end(), extension) != kSupported.end();
 }
@@ -458,7 +512,7 @@ void GltfReader::drop_textures_without_uv() {
 void GltfReader::read() {
   check_document();
   note_what_is_left_out();
-  const std::vector<Instance> instances = find_instances(source_, structure_);
+  const std::vector<Instance> instances = find_instances(source_, document_, structure_, buffers_);
   bool with_normals = false;
   for (const Instance& i : instances) {
     for (const tinygltf::Primitive& p : structure_.meshes[i.mesh].primitives)

@@ -147,6 +147,9 @@ primitive attributes=@accessors{} indices=@accessors material=@materials mode=0.
 compressions KHR_draco_mesh_compression=draco
 draco bufferView!=@bufferViews attributes!=int{}
 node mesh=@meshes children=@nodes[] matrix=number*16 rotation=number*4 scale=number*3 translation=number*3
+node extensions=copies
+copies EXT_mesh_gpu_instancing=instancing
+instancing attributes!=@accessors{}
 scene nodes=@nodes[]
 )";
 

@@ -85,6 +85,7 @@ struct ColourColumns {
       scale[i] = scale_of_type(p.type);
     }
     for (std::size_t i = 0; i < 256; ++i) table[i] = linear_from_srgb(static_cast<double>(i) / 255.0);
+    if (!any()) column.fill(-1);
   }
   bool any() const { return column[0] >= 0 && column[1] >= 0 && column[2] >= 0; }
   float linear(double value, double unit) const {
@@ -106,6 +107,13 @@ int find_scalar(const PlyElement& e, std::initializer_list<std::string_view> nam
 int find_list(const PlyElement& e, std::initializer_list<std::string_view> names) {
   const int i = e.find_property(names);
   return i >= 0 && e.properties[static_cast<std::size_t>(i)].is_list ? i : -1;
+}
+
+/// The columns, or none where one is missing: then nothing of them is read.
+template <std::size_t N>
+std::array<int, N> all_or_none(std::array<int, N> columns) {
+  if (std::ranges::any_of(columns, [](int c) { return c < 0; })) columns.fill(-1);
+  return columns;
 }
 
 /// Artec's elements, until the faces are known to which they belong.
@@ -258,14 +266,14 @@ class SurfaceReader {
                                  find_scalar(element, {"z"})};
     if (xyz[0] < 0 || xyz[1] < 0 || xyz[2] < 0)
       throw InputError(file_, "element vertex", "properties x, y and z", "not all of them");
-    const std::array<int, 3> n{find_scalar(element, {"nx"}), find_scalar(element, {"ny"}),
-                               find_scalar(element, {"nz"})};
-    const std::array<int, 2> st{
-        find_scalar(element, {"s", "u", "texture_u", "texture_s", "texcoord_u", "tu"}),
-        find_scalar(element, {"t", "v", "texture_v", "texture_t", "texcoord_v", "tv"})};
+    const auto n = all_or_none<3>(
+        {find_scalar(element, {"nx"}), find_scalar(element, {"ny"}), find_scalar(element, {"nz"})});
+    const auto st =
+        all_or_none<2>({find_scalar(element, {"s", "u", "texture_u", "texture_s", "texcoord_u", "tu"}),
+                        find_scalar(element, {"t", "v", "texture_v", "texture_t", "texcoord_v", "tv"})});
     is_splats_ = element.find_property({"f_dc_0"}) >= 0 && element.find_property({"scale_0"}) >= 0;
     const ColourColumns colours(element);
-    const bool has_normals = n[0] >= 0 && n[1] >= 0 && n[2] >= 0, has_uv = st[0] >= 0 && st[1] >= 0;
+    const bool has_normals = n[0] >= 0, has_uv = st[0] >= 0;
     count_unread(element, {xyz[0], xyz[1], xyz[2], n[0], n[1], n[2], st[0], st[1]}, &colours);
     for (std::uint64_t i = 0; i < element.count; ++i) {
       check_cancelled(i);

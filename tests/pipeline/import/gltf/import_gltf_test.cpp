@@ -275,6 +275,40 @@ TEST(ImportGltf, ShowsOneMeshInSeveralNodesAsParts) {
   expect_near(corner(mesh, 2, 0), {5, 0, 0});
 }
 
+TEST(ImportGltf, ShowsEveryCopyOfAnInstancedMesh) {
+  GltfBuilder b = quad();
+  const std::int16_t half = 23170;  // a quarter of a turn about z
+  nlohmann::json attributes{
+      {"TRANSLATION", b.attribute<float>({5, 0, 0, 0, 7, 0}, "VEC3")},
+      {"ROTATION", b.attribute<std::int16_t>({0, 0, 0, 32767, 0, 0, half, half}, "VEC4", {{"normalized", true}})},
+      {"SCALE", b.attribute<float>({1, 1, 1, 2, 2, 2}, "VEC3")},
+      {"_ID", b.attribute<float>({0, 1}, "SCALAR")}};
+  nlohmann::json& node = b.json["nodes"][0];
+  node["translation"] = {0, 0, 1};
+  node["extensions"]["EXT_mesh_gpu_instancing"]["attributes"] = attributes;
+  b.json["extensionsUsed"] = b.json["extensionsRequired"] = {"EXT_mesh_gpu_instancing"};
+  const Mesh mesh = import(b).mesh;
+  ASSERT_EQ(mesh.triangles.size(), 4u);
+  EXPECT_EQ(mesh.part_names.size(), 2u);
+  const Vec3d to_second = corner(mesh, 0, 1) - corner(mesh, 0, 0);
+  expect_near(corner(mesh, 0, 0), {5, 0, 1});
+  expect_near(corner(mesh, 2, 0), {0, 7, 1});
+  expect_near(corner(mesh, 2, 1) - corner(mesh, 2, 0), {-2 * to_second.y, 2 * to_second.x, 0}, 1e-3);
+
+  const auto refused = [&](const char* name, int accessor) {
+    GltfBuilder bad = b;
+    bad.json["nodes"][0]["extensions"]["EXT_mesh_gpu_instancing"]["attributes"][name] = accessor;
+    EXPECT_THROW(import(bad), InputError) << name;
+  };
+  refused("SCALE", b.attribute<float>({1, 1, 1}, "VEC3"));
+  refused("ROTATION", b.attribute<float>({1, 1, 1, 1, 1, 1}, "VEC3"));
+  refused("TRANSLATION", b.attribute<float>({1, 1, 1, 1, 1, std::nanf("")}, "VEC3"));
+  refused("TRANSLATION", 99);
+  b.json["nodes"][0]["extensions"]["EXT_mesh_gpu_instancing"]["attributes"] = {
+      {"SCALE", b.accessor(-1, "VEC3", 5126, 1 << 30)}};
+  EXPECT_THROW(import(b), InputError);
+}
+
 TEST(ImportGltf, ReadsTheDefaultSceneOrAllRoots) {
   GltfBuilder b = quad();
   b.json["nodes"] = {{{"mesh", 0}, {"children", {2}}}, {{"mesh", 0}}, {{"mesh", 0}}};

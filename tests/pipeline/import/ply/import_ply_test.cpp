@@ -334,4 +334,18 @@ TEST(ImportPly, SomeNanPositionsAreAWarningAllAreAnError) {
   EXPECT_THROW(import(text), InputError);
 }
 
+TEST(ImportPly, PartsOfWhatCannotBeReadAreCounted) {
+  std::string text =
+      "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n";
+  const std::vector<std::string> parts{"red", "green", "alpha", "nx", "ny", "s"};  // no blue, no nz, no t
+  for (const std::string& name : parts) text += "property float " + name + "\n";
+  text +=
+      "element face 1\nproperty list uchar int vertex_indices\nproperty uchar blue\nend_header\n"
+      "0 0 0 1 1 1 1 1 1\n1 0 0 1 1 1 1 1 1\n0 1 0 1 1 1 1 1 1\n3 0 1 2 9\n";
+  MemoryResolver resolver;
+  const ImportedModel read = import_ply("a.ply", bytes_of(text), resolver, {}, {});
+  for (const std::string& name : parts) EXPECT_EQ(read.lost.at("values \"" + name + "\" of vertex"), 3u);
+  EXPECT_EQ(read.lost.at("values \"blue\" of face"), 1u);
+}
+
 }  // namespace texmesh::import_ply_test
