@@ -179,12 +179,6 @@ std::vector<SizeCells> render_heights(const TextureSampler& sampler, const Quali
   return table_cells;
 }
 
-double mean_mip(const GroupCells& group) {
-  double sum = 0;
-  for (const ShownMip& m : group.mips) sum += m.part * m.mip;
-  return sum;
-}
-
 /// What finer mips of the smaller size lose, in the order of the larger one: full size, which may have the
 /// source's texels, comes as many levels earlier there as its planes are finer.
 PictureLosses finer_along(const PictureLosses& finer, const GroupCells& smaller, const GroupCells& larger) {
@@ -220,12 +214,14 @@ GroupPictures group_pictures(const GroupCells& group, const GroupCells& smaller,
     for (float& f : along.flip) f *= kSeamsLeft;
   PictureLosses finer = follow(group.finer, {smaller.finer, measured.finer, std::move(along)});
   PictureLosses coded = along_curve(group, smaller, measured, finer);
+  PictureLosses coarser =
+      follow(group.coarser, {smaller.coarser, measured.coarser, coarser_along(group, smaller, measured)});
+  raise_to_smaller(group, smaller, measured, coarser);
   return {
       follow(group.coded, {smaller.coded, measured.coded, std::move(coded), true}),
       follow(group.preview, {smaller.preview, measured.preview,
                              before ? enlarged(measured.preview, *before, kPreviewGrows) : measured.preview}),
-      std::move(finer),
-      follow(group.coarser, {smaller.coarser, measured.coarser, coarser_along(group, smaller, measured)})};
+      std::move(finer), std::move(coarser)};
 }
 
 /// `few` texels and triangles: the largest size follows from those below.

@@ -10,7 +10,7 @@
 
 namespace texmesh {
 
-inline constexpr int kQualityVersion = 22;
+inline constexpr int kQualityVersion = 23;
 
 struct QualityOptions {
   int views = 4;
@@ -75,7 +75,8 @@ struct QualityOptions {
 ///   `rung_samples` of the ladder are rendered, first and last among them, and planes without coding: those
 ///   that are shown, up to 4 levels finer and 2 coarser; of full size the source's rung, where there is one.
 ///   At larger sizes the lowest rung and the planes that are shown are rendered, and one coarser level of
-///   these: at the half always, at the largest of textures that have no finer plane for it. The half has the
+///   these: at the half always, at the largest of textures that have no finer plane for it. One that is not
+///   rendered loses at least what the same plane loses at the size below. The half has the
 ///   highest rung, too, and all sizes have previews. Other rungs follow along the curve of what coding adds
 ///   at the size below, by GroupCurve::kLossPerDoubling where texels are larger on the screen, and by the
 ///   ratio to it where both were rendered; a highest rung that was not has a ratio of 1. Each size has the

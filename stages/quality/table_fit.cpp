@@ -446,6 +446,25 @@ PictureLosses coarser_along(const GroupCells& larger, const GroupCells& smaller,
   return out;
 }
 
+double mean_mip(const GroupCells& group) {
+  double sum = 0;
+  for (const ShownMip& m : group.mips) sum += m.part * m.mip;
+  return sum;
+}
+
+void raise_to_smaller(const GroupCells& larger, const GroupCells& smaller, const GroupPictures& losses,
+                      PictureLosses& coarser) {
+  const long finer_by = std::lround(std::max(0.0, mean_mip(smaller) - mean_mip(larger)));
+  for (std::size_t l = 0; l < coarser.size(); ++l) {
+    const long there = static_cast<long>(l) + 1 - finer_by;  // levels coarser than what the smaller one shows
+    const PictureLosses& same = there > 0 ? losses.coarser : losses.finer;
+    const auto at = static_cast<std::size_t>(there > 0 ? there - 1 : -there);
+    if (!larger.coarser[l].empty() || at >= same.size()) continue;
+    for (const auto list : {&PictureLosses::flip, &PictureLosses::flip_p95})
+      (coarser.*list)[l] = std::max((coarser.*list)[l], (same.*list)[at]);
+  }
+}
+
 TextureLosses texture_losses(const GroupCells& group, GroupPictures pictures, float exponent) {
   const std::vector<Knot>& knots = group.knots;
   const PictureLosses& coded = pictures.coded;

@@ -141,6 +141,13 @@ PictureLosses along_curve(const GroupCells& larger, const GroupCells& smaller, c
 /// The same of coarser mips: where there are no finer planes for the larger size, its mips are as large on
 /// the screen as coarser ones of the smaller size, and lose less by what full size has become coarser.
 PictureLosses coarser_along(const GroupCells& larger, const GroupCells& smaller, const GroupPictures& losses);
+/// Raises `coarser` of the larger size, where it was not rendered, to what the same planes lose at the
+/// smaller one: between two levels the texels of small charts run together, and no ratio of others tells of
+/// it.
+void raise_to_smaller(const GroupCells& larger, const GroupCells& smaller, const GroupPictures& losses,
+                      PictureLosses& coarser);
+/// Of the planes that a size shows, by their parts of the surface.
+double mean_mip(const GroupCells& group);
 
 /// The table's part of a group and a size. Knots by rising 1 - SSIM, those that repeat one are left out. Of a
 /// knot's FLIP its mips' own is taken off, by the exponent. What is left rises, at most as fast as 1 - SSIM

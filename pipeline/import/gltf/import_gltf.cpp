@@ -114,18 +114,19 @@ std::vector<Affine> copies_of(const Source& source, const GltfJson& document, co
     AccessorReader values;
   };
   std::vector<Part> parts;
-  for (const auto& [name, components, member] :
-       {std::tuple{"TRANSLATION", 3, &tinygltf::Node::translation},
-        {"ROTATION", 4, &tinygltf::Node::rotation},
-        {"SCALE", 3, &tinygltf::Node::scale}}) {
+  for (const auto& [name, components, member] : {std::tuple{"TRANSLATION", 3, &tinygltf::Node::translation},
+                                                 {"ROTATION", 4, &tinygltf::Node::rotation},
+                                                 {"SCALE", 3, &tinygltf::Node::scale}}) {
     if (!node.contains(at / name)) continue;
     const AccessorReader values(source, model, buffers, node.at(at / name).get<std::size_t>());
     if (values.components() != components)
       source.fail(place + "/" + name, std::to_string(components) + " numbers for each copy",
                   std::to_string(values.components()));
-    const std::size_t expected = parts.empty() ? std::min(values.count(), kMostInstances) : parts[0].values.count();
+    const std::size_t expected =
+        parts.empty() ? std::min(values.count(), kMostInstances) : parts[0].values.count();
     if (values.count() != expected)
-      source.fail(place + "/" + name, (parts.empty() ? "at most " : "") + std::to_string(expected) + " copies",
+      source.fail(place + "/" + name,
+                  (parts.empty() ? "at most " : "") + std::to_string(expected) + " copies",
                   std::to_string(values.count()));
     parts.push_back({member, values});
   }

@@ -55,6 +55,23 @@ TEST(TableFit, WhatOnlyMipsLoseIsWhatTheyLose) {
   EXPECT_EQ(along_curve(group, cells({}, 0), pictures({}, 0.05f), uncoded(0.02f)).flip.size(), 0u);
 }
 
+TEST(TableFit, APlaneThatWasNotRenderedLosesNoLessThanWhereItIsShownSmaller) {
+  GroupCells smaller = cells(kDssim, 0), larger = cells(kDssim, 1);
+  smaller.mips = {{1, 2}}, larger.mips = {{1, 0}};  // all of the surface
+  larger.coarser.resize(2);
+  larger.coarser[0] = {{}};  // rendered
+  GroupPictures losses = pictures({0.05f, 0.06f, 0.12f}, 0.004f);
+  losses.finer.flip[0] = losses.finer.flip_p95[0] = 0.05f;  // mip 2 of charts of a few texels
+  PictureLosses coarser = same_in_all({0.02f, 0.021f});
+  raise_to_smaller(larger, smaller, losses, coarser);
+  EXPECT_EQ(coarser.flip, (std::vector<float>{0.02f, 0.05f}));
+  larger.mips = {{1, 2}};  // the same plane
+  coarser = same_in_all({0.02f, 0.021f});
+  losses.coarser = same_in_all({0.06f, 0.07f});
+  raise_to_smaller(larger, smaller, losses, coarser);
+  EXPECT_EQ(coarser.flip, (std::vector<float>{0.02f, 0.07f}));
+}
+
 /// Sizes 64, 128 and 256 px; all that is lost grows to 1.2 of it from 128 to 256 px.
 QualityTable small_table() {
   QualityTable table;

@@ -278,11 +278,11 @@ TEST(ImportGltf, ShowsOneMeshInSeveralNodesAsParts) {
 TEST(ImportGltf, ShowsEveryCopyOfAnInstancedMesh) {
   GltfBuilder b = quad();
   const std::int16_t half = 23170;  // a quarter of a turn about z
-  nlohmann::json attributes{
-      {"TRANSLATION", b.attribute<float>({5, 0, 0, 0, 7, 0}, "VEC3")},
-      {"ROTATION", b.attribute<std::int16_t>({0, 0, 0, 32767, 0, 0, half, half}, "VEC4", {{"normalized", true}})},
-      {"SCALE", b.attribute<float>({1, 1, 1, 2, 2, 2}, "VEC3")},
-      {"_ID", b.attribute<float>({0, 1}, "SCALAR")}};
+  nlohmann::json attributes{{"TRANSLATION", b.attribute<float>({5, 0, 0, 0, 7, 0}, "VEC3")},
+                            {"ROTATION", b.attribute<std::int16_t>({0, 0, 0, 32767, 0, 0, half, half}, "VEC4",
+                                                                   {{"normalized", true}})},
+                            {"SCALE", b.attribute<float>({1, 1, 1, 2, 2, 2}, "VEC3")},
+                            {"_ID", b.attribute<float>({0, 1}, "SCALAR")}};
   nlohmann::json& node = b.json["nodes"][0];
   node["translation"] = {0, 0, 1};
   node["extensions"]["EXT_mesh_gpu_instancing"]["attributes"] = attributes;
