@@ -57,7 +57,7 @@ TEST(TableFit, WhatOnlyMipsLoseIsWhatTheyLose) {
 
 TEST(TableFit, APlaneThatWasNotRenderedLosesNoLessThanWhereItIsShownSmaller) {
   GroupCells smaller = cells(kDssim, 0), larger = cells(kDssim, 1);
-  smaller.mips = {{1, 2}}, larger.mips = {{1, 0}};  // all of the surface
+  smaller.mips = {{2, 1}}, larger.mips = {{0, 1}};
   larger.coarser.resize(2);
   larger.coarser[0] = {{}};  // rendered
   GroupPictures losses = pictures({0.05f, 0.06f, 0.12f}, 0.004f);
@@ -65,7 +65,7 @@ TEST(TableFit, APlaneThatWasNotRenderedLosesNoLessThanWhereItIsShownSmaller) {
   PictureLosses coarser = same_in_all({0.02f, 0.021f});
   raise_to_smaller(larger, smaller, losses, coarser);
   EXPECT_EQ(coarser.flip, (std::vector<float>{0.02f, 0.05f}));
-  larger.mips = {{1, 2}};  // the same plane
+  larger.mips = {{2, 1}};  // the same plane
   coarser = same_in_all({0.02f, 0.021f});
   losses.coarser = same_in_all({0.06f, 0.07f});
   raise_to_smaller(larger, smaller, losses, coarser);
