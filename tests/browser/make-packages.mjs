@@ -24,7 +24,7 @@ const kPackages = {
   // What shows little but its surroundings.
   metal: {sheet: {alphaMode: 'OPAQUE', metal: true}, options: ['--rungs', '20,60,90']},
   // Two proxies: scales of its own with a small texture, as meshopt codes meshes.
-  proxied: {scan: ['--triangles', '30000', '--texture', '1024', '--charts', '30'], options: ['--rungs', '20,50,85'], proxies: [[300, 32], [600, 64]]},
+  proxied: {scan: ['--triangles', '30000', '--texture', '1024', '--charts', '30'], options: ['--rungs', '20,50,85'], proxies: [[300, 64], [600, 128]]},
   // The thesis as printed.
   printed: {scan: ['--triangles', '4000', '--texture', '1024', '--charts', '12'], options: ['--profile', 'thesis', '--rungs', '10,30,60,90']},
   // All of the thesis's scales, a GLB each.
