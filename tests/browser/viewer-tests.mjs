@@ -50,11 +50,11 @@ for (const [name, options] of [
     // Every plot with all sections open.
     await page.evaluate(() => { for (const d of document.querySelectorAll('details')) d.open = true; });
     await settled(page);
-    await page.locator('.plot canvas').nth(4).waitFor({state: 'attached', timeout: 20000});
+    await page.locator('.plot canvas').nth(4).waitFor({state: 'attached', timeout: 60000});
     await page.evaluate(() => { const p = document.getElementById('panel'); p.scrollTop = p.scrollHeight; });
     await settled(page);
     await shot(page, `viewer-${name}-plots`);
-  }, options), {seconds: 90});
+  }, options), {seconds: 120});
 }
 
 test('viewer: fragments by importance, rung, bytes and skipped', () => withViewer('?pkg=packages/large.texmesh&time=2', async (page) => {
@@ -293,7 +293,7 @@ for (const [name, options] of [['light', {}], ['dark', {dark: true}], ['phone', 
     check(passes.length > 10, `${passes.length} rules were looked at`);
     const said = violations.map((v) => `${v.id} (${v.impact}): ${v.nodes.slice(0, 3).map((n) => `${n.target} ${n.failureSummary}`).join('; ')}`);
     check(violations.length === 0, said.join('\n'));
-  }, options), {seconds: 90});
+  }, options), {seconds: 120});
 
 test('viewer: without WebGL, or with no address, it says so', async () => {
   for (const [name, query, text] of [
