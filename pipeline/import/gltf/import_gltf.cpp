@@ -108,6 +108,7 @@ std::vector<Affine> copies_of(const Source& source, const GltfJson& document, co
                               Buffers& buffers, std::size_t n) {
   static const GltfJson::json_pointer at("/extensions/EXT_mesh_gpu_instancing/attributes");
   const GltfJson& node = document["nodes"][n];
+  if (!node.contains(at)) return {Affine()};
   const std::string place = "/nodes/" + std::to_string(n) + at.to_string();
   struct Part {
     std::vector<double> tinygltf::Node::*member;
