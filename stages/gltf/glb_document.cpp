@@ -1,11 +1,10 @@
 #include "stages/gltf/glb_document.h"
 
-#include <meshoptimizer.h>
-
 #include <algorithm>
 #include <array>
 
 #include "format/base/bounded_json.h"
+#include "stages/gltf/decode_meshopt.h"
 #include "stages/gltf/glb_container.h"
 
 namespace texmesh {
@@ -228,32 +227,23 @@ void GlbDocument::decode_meshopt(View& view, const Json& json, const std::string
       bytes > binary_.size() - offset)
     fail("glb-reference", place, "a range within the BIN chunk",
          std::to_string(offset) + " + " + std::to_string(bytes));
-  const bool attributes = mode == "ATTRIBUTES";
-  const bool stride_fits =
-      attributes ? stride % 4 == 0 && stride > 0 && stride <= 256 : stride == 2 || stride == 4;
-  if (!stride_fits || count > kMaxDecodedBytes / stride || (mode == "TRIANGLES" && count % 3 != 0))
-    fail("glb-decode", place, "a stride and a count that " + mode + " allows",
-         std::to_string(stride) + ", " + std::to_string(count));
-  const auto source = binary_.subspan(static_cast<std::size_t>(offset), static_cast<std::size_t>(bytes));
-  std::vector<std::uint8_t> out(static_cast<std::size_t>(stride * count));
-  int rc = -1;
-  if (attributes) rc = meshopt_decodeVertexBuffer(out.data(), count, stride, source.data(), source.size());
-  if (mode == "TRIANGLES")
-    rc = meshopt_decodeIndexBuffer(out.data(), count, stride, source.data(), source.size());
-  if (mode == "INDICES")
-    rc = meshopt_decodeIndexSequence(out.data(), count, stride, source.data(), source.size());
-  if (rc != 0)
-    fail("glb-decode", place, "meshopt data of mode ATTRIBUTES, TRIANGLES or INDICES",
-         "data that does not decode");
-  if (filter == "OCTAHEDRAL" && (stride == 4 || stride == 8))
-    meshopt_decodeFilterOct(out.data(), count, stride);
-  else if (filter == "QUATERNION" && stride == 8)
-    meshopt_decodeFilterQuat(out.data(), count, stride);
-  else if (filter == "EXPONENTIAL")
-    meshopt_decodeFilterExp(out.data(), count, stride);
-  else if (!filter.empty() && filter != "NONE")
-    fail("glb-decode", place + "/filter", "a filter that fits the stride", filter);
-  view.data = decoded_.emplace_back(std::move(out));
+  if (stride > 0 && count > (kMaxDecodedBytes - decoded_bytes_) / stride)
+    fail("glb-decode", place, "at most 4 GiB in all views",
+         std::to_string(count) + " elements of " + std::to_string(stride) + " bytes");
+  decoded_bytes_ += count * stride;
+  const auto known_mode = meshopt_mode(mode);
+  const auto known_filter = meshopt_filter(filter.empty() ? "NONE" : filter);
+  if (!known_mode) fail("glb-decode", place + "/mode", "ATTRIBUTES, TRIANGLES or INDICES", mode);
+  if (!known_filter || known_filter == MeshoptFilter::kColour)
+    fail("glb-decode", place + "/filter", "a filter of the extension", filter);
+  const MeshoptStream stream{
+      binary_.subspan(static_cast<std::size_t>(offset), static_cast<std::size_t>(bytes)), count, stride,
+      *known_mode, *known_filter};
+  if (is_meshopt_version1(stream)) fail("glb-decode", place, "attributes of version 0", "version 1");
+  view.data = decoded_.emplace_back(
+      texmesh::decode_meshopt(stream, [&](const std::string& expected, const std::string& found) {
+        fail("glb-decode", place, expected, found);
+      }));
 }
 
 void GlbDocument::load_accessor(std::size_t i) {

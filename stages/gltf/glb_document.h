@@ -95,6 +95,7 @@ class GlbDocument {
   std::vector<std::uint64_t> buffer_bytes_;  // declared; 0 bytes readable for all but buffer 0
   std::vector<View> views_;
   std::vector<std::vector<std::uint8_t>> decoded_;
+  std::uint64_t decoded_bytes_ = 0;
   std::vector<Accessor> accessors_;
 };
 

@@ -9,6 +9,7 @@
 #include <array>
 
 #include "pipeline/import/gltf/import_gltf_parts.h"
+#include "stages/gltf/decode_meshopt.h"
 #include "tests/fuzz/gltf_files.h"
 
 namespace texmesh::fuzz {
@@ -320,9 +321,11 @@ bool read_meshopt(ByteSpan input) {
   const auto filter = static_cast<MeshoptFilter>(c.below(5));
   const std::uint32_t stride = c.number(1), count = c.number(2);
   c.number(3);  // of the accessor
-  Given given;
   try {
-    const Bytes bytes = decode_meshopt(given.source, "stream", c.rest(), count, stride, mode, filter);
+    const Bytes bytes = decode_meshopt({c.rest(), count, stride, mode, filter},
+                                       [](const std::string& expected, const std::string& found) {
+                                         throw InputError("fuzz", "stream", expected, found);
+                                       });
     require(bytes.size() == std::size_t{count} * stride, "fewer elements than asked for");
     return true;
   } catch (const InputError& e) {

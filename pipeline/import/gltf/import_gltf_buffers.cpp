@@ -6,27 +6,9 @@
 #include "pipeline/import/gltf/import_gltf_parts.h"
 #include "pipeline/import/named_files.h"
 #include "pipeline/import/text_scan.h"
+#include "stages/gltf/decode_meshopt.h"
 
 namespace texmesh {
-namespace {
-
-MeshoptMode mode_of(const std::string& name) {
-  if (name == "ATTRIBUTES") return MeshoptMode::kAttributes;
-  return name == "TRIANGLES" ? MeshoptMode::kTriangles : MeshoptMode::kIndices;
-}
-
-/// `place` ends with the name of the extension: that of Khronos alone has a filter of colours.
-MeshoptFilter filter_of(const Source& source, const std::string& name, const std::string& place) {
-  if (name == "NONE") return MeshoptFilter::kNone;
-  if (name == "OCTAHEDRAL") return MeshoptFilter::kOctahedral;
-  if (name == "QUATERNION") return MeshoptFilter::kQuaternion;
-  if (name == "EXPONENTIAL") return MeshoptFilter::kExponential;
-  if (name == "COLOR" && place.find("/KHR_") != place.npos) return MeshoptFilter::kColour;
-  source.fail(place + "/filter", "a filter of the extension", name.substr(0, 80));
-}
-
-}  // namespace
-
 Buffers::Buffers(const Source& source, const GltfJson& document, const tinygltf::Model& structure,
                  std::optional<ByteSpan> bin)
     : source_(source), document_(document), structure_(structure), bin_(bin) {
@@ -95,8 +77,15 @@ std::vector<std::uint8_t> Buffers::decompressed(const GltfJson& extension, const
   decompressed_bytes_ += count * stride;
   const ByteSpan data = range(extension["buffer"], extension.value("byteOffset", std::uint64_t{0}),
                               extension["byteLength"], place);
-  return decode_meshopt(source_, place, data, count, stride, mode_of(extension["mode"]),
-                        filter_of(source_, extension.value("filter", "NONE"), place));
+  const std::string name = extension.value("filter", "NONE");
+  const auto filter = meshopt_filter(name);
+  const bool has_colours = place.find("/KHR_") != place.npos;
+  if (!filter || (filter == MeshoptFilter::kColour && !has_colours))
+    source_.fail(place + "/filter", "a filter of the extension", name.substr(0, 80));
+  const auto mode = meshopt_mode(extension["mode"].get<std::string>());
+  return decode_meshopt(
+      {data, count, stride, mode.value_or(MeshoptMode::kIndices), *filter},
+      [&](const std::string& expected, const std::string& found) { source_.fail(place, expected, found); });
 }
 
 ByteSpan Buffers::view(std::size_t index, const std::string& place) {

@@ -112,16 +112,6 @@ class AccessorReader {
   const std::uint8_t* sparse_values_ = nullptr;
 };
 
-// import_gltf_meshopt.cpp
-
-enum class MeshoptMode : std::uint8_t { kAttributes, kTriangles, kIndices };
-enum class MeshoptFilter : std::uint8_t { kNone, kOctahedral, kQuaternion, kExponential, kColour };
-/// count * stride bytes, of EXT_meshopt_compression or KHR_meshopt_compression: the latter adds version 1 of
-/// attribute streams and the filter of colours. Throws InputError; allocates at most in proportion to `data`.
-std::vector<std::uint8_t> decode_meshopt(const Source& source, const std::string& place, ByteSpan data,
-                                         std::uint64_t count, std::uint64_t stride, MeshoptMode mode,
-                                         MeshoptFilter filter);
-
 // import_gltf_primitives.cpp
 
 using ReadFloats = std::function<void(std::size_t vertex, float* out)>;

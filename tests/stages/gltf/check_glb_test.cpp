@@ -304,7 +304,14 @@ TEST(CheckGlb, Meshopt) {
   EXPECT_TRUE(finds(g.glb(), "glb-reference", at));
   g = meshopt_cube();
   g.json["bufferViews"][0]["extensions"]["EXT_meshopt_compression"]["filter"] = "QUATERNION";
+  EXPECT_TRUE(finds(g.glb(), "glb-decode", at));
+  // What KHR_meshopt_compression alone has.
+  g.json["bufferViews"][0]["extensions"]["EXT_meshopt_compression"]["filter"] = "COLOR";
   EXPECT_TRUE(finds(g.glb(), "glb-decode", at + "/filter"));
+  g = meshopt_cube();
+  g.binary[g.json["bufferViews"][0]["extensions"]["EXT_meshopt_compression"]["byteOffset"]
+               .get<std::size_t>()] = 0xa1;
+  EXPECT_TRUE(finds(g.glb(), "glb-decode", at));
 }
 
 }  // namespace texmesh::check_glb_test

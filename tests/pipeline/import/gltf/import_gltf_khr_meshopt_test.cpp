@@ -7,6 +7,7 @@
 #include <cstring>
 
 #include "pipeline/import/gltf/import_gltf_parts.h"
+#include "stages/gltf/decode_meshopt.h"
 #include "tests/support/gltf_builder.h"
 #include "tests/support/meshes.h"
 
@@ -53,13 +54,10 @@ Bytes mixed_stream() {
 
 Bytes decoded(ByteSpan data, std::size_t count, std::size_t stride,
               MeshoptFilter filter = MeshoptFilter::kNone) {
-  MemoryResolver resolver;
-  const ImportOptions options;
-  Notes notes;
-  const std::string file = "m";
-  Lost lost;
-  const Source source{file, resolver, options, {}, notes, lost};
-  return decode_meshopt(source, "", data, count, stride, MeshoptMode::kAttributes, filter);
+  return decode_meshopt({data, count, stride, MeshoptMode::kAttributes, filter},
+                        [](const std::string& expected, const std::string& found) {
+                          throw InputError("m", "", expected, found);
+                        });
 }
 
 TEST(ImportGltfKhrMeshopt, ReadsVersion1OfAttributes) {

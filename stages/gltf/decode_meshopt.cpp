@@ -1,6 +1,11 @@
+#include "stages/gltf/decode_meshopt.h"
+
 #include <meshoptimizer.h>
 
-#include "pipeline/import/gltf/import_gltf_parts.h"
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
 
 namespace texmesh {
 namespace {
@@ -134,8 +139,6 @@ std::size_t block_elements(std::size_t stride) {
   return std::min(kBlockBytes / stride / kGroup * kGroup, kMostBlock);
 }
 
-bool is_attributes_v1(ByteSpan data) { return !data.empty() && data[0] == kVersion1; }
-
 /// Fewest bytes that so many elements take.
 std::uint64_t fewest_attribute_bytes_v1(std::uint64_t count, std::uint64_t stride) {
   const std::uint64_t block = block_elements(stride);
@@ -162,32 +165,35 @@ bool decode_attributes_v1(ByteSpan data, std::size_t count, std::size_t stride,
 
 // Both versions, and the filters behind them.
 
-void check_layout(const Source& source, const std::string& place, std::uint64_t count, std::uint64_t stride,
-                  MeshoptMode mode, MeshoptFilter filter) {
-  const auto found = [&] {
-    return std::to_string(count) + " elements of " + std::to_string(stride) + " bytes";
-  };
-  if (mode == MeshoptMode::kAttributes) {
-    const bool fits =
-        filter == MeshoptFilter::kOctahedral || filter == MeshoptFilter::kColour ? stride == 4 || stride == 8
-        : filter == MeshoptFilter::kQuaternion                                   ? stride == 8
-                                               : stride % 4 == 0 && stride >= 4 && stride <= 256;
-    if (!fits) source.fail(place, "a byteStride that mode and filter allow", found());
-    return;
+/// What is wrong with the layout; nothing where all is well.
+struct WrongLayout {
+  std::string expected, found;
+};
+std::optional<WrongLayout> wrong_layout(const MeshoptStream& in) {
+  const std::uint64_t stride = in.stride;
+  const std::string found = std::to_string(in.count) + " elements of " + std::to_string(stride) + " bytes";
+  if (in.mode == MeshoptMode::kAttributes) {
+    const bool narrow = in.filter == MeshoptFilter::kOctahedral || in.filter == MeshoptFilter::kColour;
+    const bool fits = narrow ? stride == 4 || stride == 8
+                      : in.filter == MeshoptFilter::kQuaternion
+                          ? stride == 8
+                          : stride % 4 == 0 && stride >= 4 && stride <= 256;
+    if (!fits) return WrongLayout{"a byteStride that mode and filter allow", found};
+    return std::nullopt;
   }
-  if (filter != MeshoptFilter::kNone) source.fail(place, "no filter on indices", "one");
-  if (stride != 2 && stride != 4) source.fail(place, "indices of 2 or 4 bytes", found());
-  if (mode == MeshoptMode::kTriangles && count % 3 != 0) source.fail(place, "whole triangles", found());
+  if (in.filter != MeshoptFilter::kNone) return WrongLayout{"no filter on indices", "one"};
+  if (stride != 2 && stride != 4) return WrongLayout{"indices of 2 or 4 bytes", found};
+  if (in.mode == MeshoptMode::kTriangles && in.count % 3 != 0) return WrongLayout{"whole triangles", found};
+  return std::nullopt;
 }
 
 /// Fewest bytes that the codec spends on so many elements; a header that promises more is a lie, found
 /// out before anything is allocated. Attributes: 2 bits per 16 bytes of one column; triangles and
 /// indices: a byte each.
-std::uint64_t fewest_bytes(ByteSpan data, std::uint64_t count, std::uint64_t stride, MeshoptMode mode) {
-  if (mode == MeshoptMode::kAttributes && is_attributes_v1(data))
-    return fewest_attribute_bytes_v1(count, stride);
-  if (mode == MeshoptMode::kAttributes) return count / 64 * stride;
-  return mode == MeshoptMode::kTriangles ? count / 3 : count;
+std::uint64_t fewest_bytes(const MeshoptStream& in) {
+  if (is_meshopt_version1(in)) return fewest_attribute_bytes_v1(in.count, in.stride);
+  if (in.mode == MeshoptMode::kAttributes) return in.count / 64 * in.stride;
+  return in.mode == MeshoptMode::kTriangles ? in.count / 3 : in.count;
 }
 
 // The filters are those of EXT_meshopt_compression and KHR_meshopt_compression, in scalar code:
@@ -297,34 +303,46 @@ void apply_filter(std::vector<std::uint8_t>& bytes, std::uint64_t stride, Meshop
 
 }  // namespace
 
-std::vector<std::uint8_t> decode_meshopt(const Source& source, const std::string& place, ByteSpan data,
-                                         std::uint64_t count, std::uint64_t stride, MeshoptMode mode,
-                                         MeshoptFilter filter) {
-  check_layout(source, place, count, stride, mode, filter);
-  if (count == 0) return {};
-  if (fewest_bytes(data, count, stride, mode) > data.size()) {
-    source.fail(place, "data for " + std::to_string(count) + " elements",
-                std::to_string(data.size()) + " bytes");
-  }
+std::optional<MeshoptMode> meshopt_mode(std::string_view name) {
+  if (name == "ATTRIBUTES") return MeshoptMode::kAttributes;
+  if (name == "TRIANGLES") return MeshoptMode::kTriangles;
+  if (name == "INDICES") return MeshoptMode::kIndices;
+  return std::nullopt;
+}
+
+std::optional<MeshoptFilter> meshopt_filter(std::string_view name) {
+  if (name == "NONE") return MeshoptFilter::kNone;
+  if (name == "OCTAHEDRAL") return MeshoptFilter::kOctahedral;
+  if (name == "QUATERNION") return MeshoptFilter::kQuaternion;
+  if (name == "EXPONENTIAL") return MeshoptFilter::kExponential;
+  if (name == "COLOR") return MeshoptFilter::kColour;
+  return std::nullopt;
+}
+
+bool is_meshopt_version1(const MeshoptStream& stream) {
+  return stream.mode == MeshoptMode::kAttributes && !stream.data.empty() && stream.data[0] == kVersion1;
+}
+
+std::vector<std::uint8_t> decode_meshopt(const MeshoptStream& in, const MeshoptFailure& fail) {
+  if (const auto wrong = wrong_layout(in)) fail(wrong->expected, wrong->found);
+  if (in.count == 0) return {};
   // The codecs look at data[0] and at a tail before they compare lengths in some versions.
-  if (data.empty()) source.fail(place, "data", "0 bytes");
-  std::vector<std::uint8_t> out(count * stride);
+  if (in.data.empty() || fewest_bytes(in) > in.data.size())
+    fail("data for " + std::to_string(in.count) + " elements", std::to_string(in.data.size()) + " bytes");
+  std::vector<std::uint8_t> out(in.count * in.stride);
+  const std::uint8_t* data = in.data.data();
+  const std::size_t bytes = in.data.size();
   int status = 0;
-  switch (mode) {
-    case MeshoptMode::kAttributes:
-      status = is_attributes_v1(data)
-                   ? !decode_attributes_v1(data, count, stride, out)
-                   : meshopt_decodeVertexBuffer(out.data(), count, stride, data.data(), data.size());
-      break;
-    case MeshoptMode::kTriangles:
-      status = meshopt_decodeIndexBuffer(out.data(), count, stride, data.data(), data.size());
-      break;
-    case MeshoptMode::kIndices:
-      status = meshopt_decodeIndexSequence(out.data(), count, stride, data.data(), data.size());
-      break;
-  }
-  if (status != 0) source.fail(place, "meshopt-compressed data", "other bytes");
-  apply_filter(out, stride, filter);
+  if (is_meshopt_version1(in))
+    status = !decode_attributes_v1(in.data, in.count, in.stride, out);
+  else if (in.mode == MeshoptMode::kAttributes)
+    status = meshopt_decodeVertexBuffer(out.data(), in.count, in.stride, data, bytes);
+  else if (in.mode == MeshoptMode::kTriangles)
+    status = meshopt_decodeIndexBuffer(out.data(), in.count, in.stride, data, bytes);
+  else
+    status = meshopt_decodeIndexSequence(out.data(), in.count, in.stride, data, bytes);
+  if (status != 0) fail("meshopt-compressed data", "other bytes");
+  apply_filter(out, in.stride, in.filter);
   return out;
 }
 
