@@ -7,6 +7,7 @@
 #include <filesystem>
 
 #include "delivery/cpp/client/texture_loader.h"
+#include "delivery/cpp/decide/request_groups.h"
 #include "delivery/cpp/package/http_store.h"
 #include "pipeline/io/atomic_file.h"
 #include "pipeline/io/table.h"

@@ -1,11 +1,15 @@
 #include "delivery/cpp/client/delivery_plan.h"
 
+#include "delivery/cpp/decide/request_groups.h"
 #include "format/rules/jnd_choice.h"
 
 namespace texmesh {
 namespace {
 
 constexpr double kWorthwhileFlip = 1e-4;  // a coarser scale must look better, not only as good
+// Where a picture is so many times as far off as its bytes could show, textures are chosen again for so much
+// of the bytes.
+constexpr double kFarFromPlanned = 1.05, kFewerBytes = 0.7;
 
 /// Of the textures' rungs in the plan.
 void rate(PackageReader& package, double displayed_px, const FragmentList& list, DeliveryPlan& plan) {
@@ -127,6 +131,7 @@ void count_memory(PackageReader& package, const DeliveryRequest& request, Delive
 struct ChosenTextures {
   std::vector<PlaneChoice> planes;
   FragmentList list;
+  double flip = 1;  // where all that was planned comes
   double gamma = -1;
 };
 
@@ -134,30 +139,58 @@ ChosenTextures choose_textures(TextureLoss& loss, const DeliveryRequest& request
                                double bytes) {
   if (request.htc.policy == Policy::kThesis) {
     ThesisTextures printed = thesis_textures(loss, options, bytes);
-    return {std::move(printed.planes), std::move(printed.list), printed.options.gamma};
+    return {std::move(printed.planes), std::move(printed.list), 1, printed.options.gamma};
   }
   TextureBudget budget = texture_for_budget(loss, options, static_cast<std::uint64_t>(bytes),
                                             texture_memory(loss.package(), request, options.scale));
-  return {std::move(budget.planes), std::move(budget.list), options.gamma};
+  return {std::move(budget.planes), std::move(budget.list), budget.flip, options.gamma};
 }
 
-DeliveryPlan plan_at_scale(TextureLoss& loss, const DeliveryRequest& request, int scale) {
-  PackageReader& package = loss.package();
-  const Manifest& m = package.manifest();
-  DeliveryPlan plan;
-  plan.scale = scale;
-  count_fixed_bytes(m, scale, plan);
-  const double manifest_s = fetched_s(request.network, 0, plan.bootstrap_bytes);
-  plan.first_picture_s = fetched_s(request.network, manifest_s, plan.first_picture_bytes);
-  take_step(m, request, manifest_s, plan);
-  const std::uint64_t fixed = plan.mesh_bytes + plan.table_bytes;
-  plan.mesh_s = plan.step ? fetched_s(request.network, plan.step_s, fixed)
-                          : fetched_s(request.network, manifest_s, plan.first_picture_bytes + fixed);
+/// What became of the list's fragments: each as if it had been asked for by itself when its group was.
+SimulationResult ungrouped(const SimulationResult& grouped, const GroupedOffers& groups,
+                           const FragmentList& list) {
+  SimulationResult out = grouped;
+  out.rungs.clear(), out.steps.clear();
+  out.skipped = out.given_up = 0;
+  std::vector<std::uint32_t> first;
+  for (std::size_t g = 0; g < groups.counts.size(); ++g) {
+    first.push_back(static_cast<std::uint32_t>(out.rungs.size()));
+    out.rungs.insert(out.rungs.end(), groups.counts[g], grouped.rungs[g]);
+  }
+  for (HtcStep step : grouped.steps) {
+    const std::uint32_t g = step.offer;
+    const double of_planned = step.target_bytes / groups.offers[g].planned_bytes;
+    const bool given_up = step.rung < 0 && step.bytes > 0;
+    for (std::uint32_t i = first[g]; i < first[g] + groups.counts[g]; ++i) {
+      const FragmentOffer& offer = list.offers[i];
+      step.offer = i;
+      step.position = static_cast<std::uint32_t>(out.steps.size() + 1);
+      if (step.rung >= 0) step.bytes = offer.bytes[static_cast<std::size_t>(step.rung)];
+      step.target_bytes = of_planned * offer.planned_bytes;
+      out.steps.push_back(step);
+      out.given_up += given_up;
+    }
+  }
+  out.skipped = static_cast<std::uint32_t>(std::ranges::count(out.rungs, -1));
+  return out;
+}
 
-  const HtcOptions htc = request_htc(request, request.time_limit_s - plan.mesh_s,
-                                     shown_throughput(plan, manifest_s, request.network.rtt_s));
-  const ChosenTextures chosen = choose_textures(loss, request, list_options(request, scale),
-                                                std::max(0.0, htc.time_limit_s) * htc.initial_bytes_s);
+/// How the list's fragments come in the time: in groups, as clients ask for them. The thesis asks for them
+/// one by one, and so does who sets the window.
+SimulationResult played(const DeliveryRequest& request, int scale, const FragmentList& list,
+                        const HtcOptions& htc, const NetworkOptions& network) {
+  const auto play = [&](const std::vector<FragmentOffer>& offers) {
+    return request.play ? request.play(scale, offers, htc, network) : simulate(offers, htc, network);
+  };
+  if (htc.policy == Policy::kThesis || htc.window > 0) return play(list.offers);
+  const double bytes_each = group_bytes(htc.initial_bytes_s, htc.rtt_s, htc.time_limit_s);
+  const GroupedOffers groups = grouped_offers(list, bytes_each, htc.initial_bytes_s * htc.time_limit_s);
+  return ungrouped(play(groups.offers), groups, list);
+}
+
+/// Textures for so many bytes, and what of them comes in the time.
+DeliveryPlan with_textures(TextureLoss& loss, const DeliveryRequest& request, const HtcOptions& htc,
+                           const ChosenTextures& chosen, DeliveryPlan plan) {
   plan.planes = chosen.planes;
   plan.gamma = chosen.gamma;
   const FragmentList& list = chosen.list;
@@ -173,12 +206,40 @@ DeliveryPlan plan_at_scale(TextureLoss& loss, const DeliveryRequest& request, in
           "less than 30 round trips are left for textures: the limit may be missed by more than 2 %");
     const NetworkOptions network =
         network_from(without_dead_mirrors(request.network, plan.mesh_s), plan.mesh_s);
-    plan.textures =
-        request.play ? request.play(scale, list.offers, htc, network) : simulate(list.offers, htc, network);
+    plan.textures = played(request, plan.scale, list, htc, network);
     plan.complete_s = plan.mesh_s + plan.textures.end_s;
   }
   plan.texture_bytes = plan.textures.bytes;
-  rate(package, request.displayed_px, list, plan);
+  rate(loss.package(), request.displayed_px, list, plan);
+  return plan;
+}
+
+DeliveryPlan plan_at_scale(TextureLoss& loss, const DeliveryRequest& request, int scale) {
+  const Manifest& m = loss.package().manifest();
+  DeliveryPlan plan;
+  plan.scale = scale;
+  count_fixed_bytes(m, scale, plan);
+  const double manifest_s = fetched_s(request.network, 0, plan.bootstrap_bytes);
+  plan.first_picture_s = fetched_s(request.network, manifest_s, plan.first_picture_bytes);
+  take_step(m, request, manifest_s, plan);
+  const std::uint64_t fixed = plan.mesh_bytes + plan.table_bytes;
+  plan.mesh_s = plan.step ? fetched_s(request.network, plan.step_s, fixed)
+                          : fetched_s(request.network, manifest_s, plan.first_picture_bytes + fixed);
+
+  const HtcOptions htc = request_htc(request, request.time_limit_s - plan.mesh_s,
+                                     shown_throughput(plan, manifest_s, request.network.rtt_s));
+  const auto choose = [&](double bytes) {
+    return choose_textures(loss, request, list_options(request, scale), bytes);
+  };
+  const double bytes = std::max(0.0, htc.time_limit_s) * htc.initial_bytes_s;
+  const ChosenTextures chosen = choose(bytes);
+  const DeliveryPlan fixed_parts = plan;
+  plan = with_textures(loss, request, htc, chosen, fixed_parts);
+  // A transfer spends bytes less well than a plan that knows them: then fewer texels look better in the time.
+  if (plan.texture_bytes > 0 && plan.flip > kFarFromPlanned * chosen.flip) {
+    DeliveryPlan again = with_textures(loss, request, htc, choose(kFewerBytes * bytes), fixed_parts);
+    if (again.flip < plan.flip) plan = std::move(again);
+  }
   if (!std::isfinite(plan.first_picture_s)) plan.flip = plan.texture_flip = 1;
   return plan;
 }

@@ -74,6 +74,10 @@ struct DeliveryPlan {
 /// one gives the better picture in the time. A proxy that cannot be told from S_0 at the displayed height, or
 /// that looks better than what scales give in the time, takes the place of all; not where the request says a
 /// scale, and not the former where it asks for another rule than kFlip.
+/// Textures are those that look best in the bytes that the link gives in the time left; where a simulation
+/// shows a picture farther off than these could, also those for fewer bytes, and what looks better stays.
+/// Fragments come in groups, as clients ask for them (decide/request_groups.h); one by one with
+/// Policy::kThesis or a window of the request's own.
 /// On a slow link a larger proxy may come before documents and mesh, where proxy_step() says so. A scale and
 /// mips of the textures keep within DeliveryRequest::memory_bytes.
 /// With Policy::kThesis it is as printed: the rule's scale and no other, textures by the display's

@@ -1,12 +1,10 @@
 #include "delivery/cpp/client/texture_loader.h"
 
+#include "delivery/cpp/decide/request_groups.h"
+
 namespace texmesh {
 namespace {
 
-// As delivery/web/src/decide/request_groups.ts.
-constexpr double kLeastRequest_s = 0.006;  // a request is worth at least so much of the link
-constexpr double kHiddenRtts = 0.6;        // that six connections at once hide
-constexpr double kLeastDecisions = 48;
 constexpr double kGraceShare = 0.1, kLeastGrace_s = 0.5, kGraceRtts = 8;
 
 bool is_incremental(PackageReader& package, std::uint32_t plane) {
@@ -30,14 +28,6 @@ FragmentOffer above(const FragmentOffer& f, std::int32_t held, bool incremental)
   out.low_rung = less(f.low_rung);
   out.high_rung = less(f.high_rung);
   return out;
-}
-
-/// Two offers of equal rungs as one.
-void join(FragmentOffer& all, const FragmentOffer& one) {
-  for (std::size_t r = 0; r < all.bytes.size(); ++r) all.bytes[r] += one.bytes[r];
-  for (std::size_t r = 0; r < all.loss.size(); ++r) all.loss[r] += one.loss[r];
-  all.eta = std::max(all.eta, one.eta);
-  all.planned_bytes += one.planned_bytes;
 }
 
 /// The upgrades that are left, asked for in order with a few requests in flight.
@@ -125,11 +115,6 @@ LoadReport report_of(const TransferEnd& end) {
 }
 
 }  // namespace
-
-double group_bytes(double bytes_s, double rtt_s, double limit_s) {
-  return std::min(bytes_s * std::max(kLeastRequest_s, kHiddenRtts * rtt_s),
-                  bytes_s * limit_s / kLeastDecisions);
-}
 
 TextureLoader::TextureLoader(PackageReader& package, Transport& transport, bool whole_rungs)
     : package_(package), transport_(transport), whole_rungs_(whole_rungs) {

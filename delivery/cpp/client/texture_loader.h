@@ -39,11 +39,6 @@ struct LoadReport {
   std::vector<MirrorShare> mirrors;               // in the transport's order
 };
 
-/// Bytes that one request should bring: so many that the link is not idle between two answers, and so few
-/// that the decisions left at the end of a time limit can make up for a bad start. The browser client uses
-/// the same number.
-double group_bytes(double bytes_s, double rtt_s, double limit_s);
-
 /// The textures of a package that a client holds. Loads fragments within a time limit, upgrades fragments
 /// after the limit, and loads other fragments when the display changes. A fragment that is held is not
 /// fetched again. Not thread-safe.

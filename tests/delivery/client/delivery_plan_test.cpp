@@ -240,4 +240,48 @@ TEST(DeliveryPlan, MemoryIsKept) {
   EXPECT_EQ(plan_delivery(package, none).scale, package.manifest().scales.back().scale);
 }
 
+PackageReader open_golden() {
+  return PackageReader(
+      open_container(open_file_source(std::string(TEXMESH_SOURCE_DIR) + "/tests/golden/v2.0-scan.texmesh")));
+}
+
+TEST(DeliveryPlan, FragmentsComeInGroupsThatHideRoundTrips) {
+  PackageReader package = open_golden();
+  DeliveryRequest r = request(800, 3e5, 2);
+  r.network.rtt_s = 0.1;
+  r.scale = 0;
+  std::size_t groups = 0;
+  r.play = [&](int, const std::vector<FragmentOffer>& offers, const HtcOptions& htc,
+               const NetworkOptions& network) {
+    groups = offers.size();
+    return simulate(offers, htc, network);
+  };
+  const DeliveryPlan plan = plan_delivery(package, r);
+  const std::size_t fragments = plan.textures.rungs.size();
+  EXPECT_LT(groups, fragments);
+  EXPECT_EQ(list_of(package, r, plan).offers.size(), fragments);
+  EXPECT_EQ(plan.textures.steps.size(), fragments);
+  std::uint64_t bytes = 0;
+  for (const HtcStep& s : plan.textures.steps)
+    if (s.rung >= 0) bytes += s.bytes;
+  EXPECT_EQ(bytes, plan.textures.bytes);
+  r.htc.window = 6;  // fragment by fragment
+  EXPECT_EQ(plan_delivery(package, r).textures.rungs.size(), groups);
+}
+
+TEST(DeliveryPlan, WhatATransferSpendsBadlyIsChosenAgain) {
+  PackageReader package = open_golden();
+  DeliveryRequest r = request(800, 3e5, 2);
+  r.scale = 0;
+  std::vector<double> losses;
+  r.play = [&](int, const std::vector<FragmentOffer>& offers, const HtcOptions& htc, NetworkOptions network) {
+    if (losses.empty()) network.link = BandwidthTrace::constant(2e4);
+    losses.push_back(simulate(offers, htc, network).loss);
+    return simulate(offers, htc, network);
+  };
+  const DeliveryPlan plan = plan_delivery(package, r);
+  ASSERT_EQ(losses.size(), 2u);
+  EXPECT_EQ(plan.textures.loss, losses[1]);
+}
+
 }  // namespace texmesh::delivery_plan_test

@@ -1,3 +1,4 @@
+import { hiddenRtts, leastDecisions, leastRequestS } from '../format/shared_numbers';
 import type { RequestRecord } from '../http/requests';
 import type { FragmentList, ListedFragment } from './fragment_list';
 import { clamp, sumOf } from './numbers';
@@ -9,13 +10,6 @@ export interface GroupedList {
   /** Fragments by offer; those of an offer are of one plane, in the order of its packs. */
   groups: ListedFragment[][];
 }
-
-/** A request should take at least these seconds of the link. */
-const leastRequestS = 0.006;
-/** Round trips that six connections at once hide. */
-const hiddenRtts = 0.6;
-/** Decisions that a time limit should have, so that the last ones can make good what the first took. */
-const leastDecisions = 48;
 
 /** Bytes that one request should bring, so that waiting for answers does not leave the link idle. */
 export function groupBytes(bytesS: number, rttS: number, limitS: number): number {

@@ -1,10 +1,11 @@
-import { worthwhileFlip } from '../format/shared_numbers';
+import { farFromPlanned, fewerBytes, worthwhileFlip } from '../format/shared_numbers';
 import { PackageData } from '../format/tables';
 import { FragmentList, lossesOf } from './fragment_list';
 import { type BytesOf, planesWithin } from './gpu_memory';
 import { scaleBytes } from './gpu_size';
 import type { TimePlanOptions } from './harmonic_time';
 import { geometryFlip } from './prediction';
+import { groupBytes, groupedList } from './request_groups';
 import { Simulated, simulate } from './simulation';
 import { TextureSpending, budgetSteps, spendOn } from './texture_budget';
 import { PlaneChoice, TextureLoss, pictureFlip, textureFlip } from './texture_loss';
@@ -47,27 +48,47 @@ function texturesWithin({ data: { manifest } }: TextureLoss, { memoryBytes = Inf
   return memoryBytes - (mesh ? scaleBytes(mesh) : 0);
 }
 
-/** Textures beside one scale; the generator gives the page a turn between its steps. */
-function* texturesInTime(loss: TextureLoss, request: InTimeRequest, scale: number): Generator<void, InTime> {
-  const { plan, linkBytesS } = request.afterMesh(scale);
+/**
+ * Textures for so many bytes beside one scale, what comes of them in the time, and the FLIP of the picture
+ * where all of it comes.
+ */
+function* texturesFor(loss: TextureLoss, request: InTimeRequest, scale: number, bytes: number,
+    { plan, linkBytesS }: ReturnType<InTimeRequest['afterMesh']>): Generator<void, [InTime, number]> {
   const { timeLimitS, initialBytesS, rttS } = plan;
-  const bytes = Math.max(0, timeLimitS) * initialBytesS;
+  let planned = 1;
   let spent: Pick<TextureSpending, 'list' | 'planes'> | undefined = request.textures?.(loss, scale, bytes);
   if (!spent) {
-    for (spent of budgetSteps(loss, { scale }, Math.floor(bytes))) yield;
-    const { planes, list: { groupWeights } } = spent!;
+    let best: TextureSpending;
+    for (best of budgetSteps(loss, { scale }, Math.floor(bytes))) yield;
+    const { planes, list: { groupWeights } } = best!;
     const within = planesWithin(loss, planes, texturesWithin(loss, request, scale), request.ways);
     if (within.some(({ plane }, i) => plane !== planes[i].plane))
-      spent = spendOn(loss, within, { scale, groupWeights }, Math.floor(bytes));
+      best = spendOn(loss, within, { scale, groupWeights }, Math.floor(bytes));
+    spent = best!;
+    planned = best!.flip;
   }
-  const { list, planes } = spent!;
-  const played = simulate(list.offers, plan, { bytesS: linkBytesS, rttS, connections: request.connections });
+  const { list, planes } = spent;
+  // In groups, as loads ask for them.
+  const bytesEach = request.textures ? 0 : groupBytes(initialBytesS, rttS, timeLimitS);
+  const { offers, groups } = groupedList(list, bytesEach, initialBytesS * timeLimitS);
+  const played = simulate(offers, plan, { bytesS: linkBytesS, rttS, connections: request.connections });
+  const rungs = groups.flatMap((group, i) => group.map(() => played.rungs[i]));
   yield;
-  const losses = lossesOf(list, played.rungs);
+  const losses = lossesOf(list, rungs);
   const { data: { quality }, displayedPx } = loss;
   const flip = pictureFlip(quality, displayedPx, scale, losses);
-  return { scale, planes, list, flip, textureFlip: textureFlip(quality, losses), late: timeLimitS <= 0,
-    ...played };
+  return [{ scale, planes, list, flip, textureFlip: textureFlip(quality, losses), late: timeLimitS <= 0,
+    ...played, rungs }, planned];
+}
+/** Textures beside one scale; the generator gives the page a turn between its steps. */
+function* texturesInTime(loss: TextureLoss, request: InTimeRequest, scale: number): Generator<void, InTime> {
+  const link = request.afterMesh(scale);
+  const bytes = Math.max(0, link.plan.timeLimitS) * link.plan.initialBytesS;
+  const [first, planned] = yield* texturesFor(loss, request, scale, bytes, link);
+  // A transfer spends bytes less well than a plan that knows them: then fewer texels look better in the time.
+  if (!(first.bytes > 0 && first.flip > farFromPlanned * planned)) return first;
+  const [again] = yield* texturesFor(loss, request, scale, fewerBytes * bytes, link);
+  return again.flip < first.flip ? again : first;
 }
 
 /**
