@@ -379,6 +379,34 @@ void split_into_tiles(ObjData& data, const std::vector<bool>& tiled, const std::
   warn_of_tiles(notes, file, made.size(), left_out);
 }
 
+/// Where faces name one material, or none, and the libraries have one, of another name: who renames a
+/// material in one of two files means it.
+void take_only_material(ObjData& data, const std::vector<LoadedLibrary>& libraries, const std::string& file,
+                        Notes& notes) {
+  if (libraries.size() != 1 || libraries[0].file.materials.size() != 1) return;
+  const std::uint16_t used = data.faces[0].material;
+  const auto is_used = [used](const ObjFace& f) { return f.material == used; };
+  std::string& name = data.materials[used];
+  const std::string& only = libraries[0].file.materials[0].name;
+  if (libraries[0].find(name) || !std::ranges::all_of(data.faces, is_used)) return;
+  add_warning(notes, "other-material", file,
+              (name.empty() ? "faces name no material" : "material " + quote(name) + " is in no library") +
+                  "; " + quote(only) + ", the only one of " + quote(libraries[0].name) + ", is taken");
+  name = only;
+}
+
+/// "are "skin", "base" and 3 more".
+std::string names_of_materials(const std::vector<LoadedLibrary>& libraries) {
+  constexpr std::size_t kMostTold = 3;
+  std::string text;
+  std::size_t count = 0;
+  for (const LoadedLibrary& library : libraries)
+    for (const MtlMaterial& material : library.file.materials)
+      if (count++ < kMostTold) text += (text.empty() ? "are " : ", ") + quote(material.name);
+  if (count > kMostTold) text += " and " + std::to_string(count - kMostTold) + " more";
+  return text.empty() ? "are none" : text;
+}
+
 Material make_material(const std::string& name, std::uint16_t tile,
                        const std::vector<LoadedLibrary>& libraries, bool any_library, const std::string& file,
                        Model& model, Resolver& resolver, const ImportOptions& options) {
@@ -386,8 +414,9 @@ Material make_material(const std::string& name, std::uint16_t tile,
     return material_from_mtl(tile == 0 ? *material : of_tile(*material, tile), library->file, library->name,
                              model, resolver, options);
   if (!libraries.empty())
-    add_warning(model.notes, "missing-material", file,
-                "material " + quote(name) + " is in no material library");
+    add_warning(
+        model.notes, "missing-material", file,
+        "material " + quote(name) + " is in no material library; there " + names_of_materials(libraries));
   else if (!any_library)
     add_warning(model.notes, "missing-material", file,
                 "material " + quote(name) + " is used but no mtllib names a library");
@@ -408,9 +437,13 @@ void add_obj_materials(ObjData& data, const std::string& file, Model& model, Res
   for (const LoadedLibrary& library : libraries)
     for (const auto& [word, count] : library.file.unread)
       lost["statements " + quote(word) + " of materials"] += count;
+  if (!loader.any_missing()) take_only_material(data, libraries, file, model.notes);
   split_into_tiles(data, find_tiled(data, libraries, resolver, options), file, model.notes);
   std::vector<std::uint8_t> used(data.materials.size(), 0);
   for (const ObjFace& f : data.faces) used[f.material] = 1;
+  if (used[0] && data.materials[0].empty() && !libraries.empty())
+    add_warning(model.notes, "missing-material", file,
+                "faces name no material (usemtl); there " + names_of_materials(libraries));
   for (std::size_t i = 0; i < data.materials.size(); ++i) {
     // Textures of materials without faces are never asked for.
     const bool named = used[i] && !(i == 0 && data.materials[0].empty());

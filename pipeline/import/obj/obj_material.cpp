@@ -76,18 +76,30 @@ class MtlReader {
       if (!word.empty() && word.front() == '#') {
         if (lower(line.substr(0, 200)).find("meshlab") != std::string::npos) file_.by_meshlab = true;
       } else if (same_word(word, "newmtl")) {
-        if (file_.materials.size() >= kMaxObjMaterials)
-          throw InputError(name_, lines_.place(),
-                           "at most " + std::to_string(kMaxObjMaterials) + " materials", "more");
-        file_.materials.emplace_back().name = trim(rest);
+        begin(std::string(trim(rest)));
       } else if (!file_.materials.empty()) {
-        statement(lower(word), rest, file_.materials.back());
+        statement(lower(word), rest, file_.materials[current_]);
       }
     }
     return std::move(file_);
   }
 
  private:
+  /// A name that is there already goes on, as in most readers: later statements stand.
+  void begin(const std::string& material) {
+    const auto [at, is_new] = number_of_.try_emplace(material, file_.materials.size());
+    current_ = at->second;
+    if (!is_new && !std::exchange(repeated_, true))
+      add_warning(notes_, "repeated-material", name_ + " " + lines_.place(),
+                  "material " + quote(material) +
+                      " is there already; what stands here is added to it, or set over it");
+    if (!is_new) return;
+    if (file_.materials.size() >= kMaxObjMaterials)
+      throw InputError(name_, lines_.place(), "at most " + std::to_string(kMaxObjMaterials) + " materials",
+                       "more");
+    file_.materials.emplace_back().name = material;
+  }
+
   std::optional<double> number(std::string_view rest) {
     double x = 0;
     std::string_view token = next_token(rest);
@@ -149,7 +161,9 @@ class MtlReader {
   LineReader lines_;
   Notes& notes_;
   MtlFile file_;
-  bool warned_ = false;
+  std::map<std::string, std::size_t> number_of_;  // of materials
+  std::size_t current_ = 0;
+  bool warned_ = false, repeated_ = false;
 };
 
 // ---- to glTF
@@ -353,6 +367,7 @@ void LibraryLoader::missing(const std::string& name, const std::string& looked_f
     return add_warning(model_.notes, "renamed-mtl", place_,
                        "material library " + quote(name) + " is not there; " + quote(loaded_[0].name) +
                            ", which is named after the model, is taken");
+  any_missing_ = true;
   add_warning(
       model_.notes, "missing-mtl", place_,
       "material library " + quote(name) + " not found: " + looked_for + "; its materials stay untextured");

@@ -74,6 +74,7 @@ class LibraryLoader {
   /// `mtllib a.mtl b.mtl` names two files, `mtllib my scan.mtl` one: the whole is tried first.
   void load(const std::string& names, std::size_t line);
   std::vector<LoadedLibrary> take() { return std::move(loaded_); }
+  bool any_missing() const { return any_missing_; }
 
  private:
   std::string load_one(const std::string& name);
@@ -85,6 +86,7 @@ class LibraryLoader {
   const std::uint64_t max_bytes_;
   std::string place_;
   std::vector<LoadedLibrary> loaded_;
+  bool any_missing_ = false;
 };
 
 /// The glTF material, images added to the model. Decisions where MTL is vague:
