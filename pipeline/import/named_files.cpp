@@ -199,6 +199,7 @@ constexpr Beginning kTexts[] = {
     {"<!doctype html", "an HTML page, as servers send in the place of a file"},
     {"<html", "an HTML page, as servers send in the place of a file"},
     {"<?xml", "an XML file"},
+    {"<svg", "an SVG drawing (export it as PNG)"},
     {"outs:", "a DVC pointer (dvc pull fetches the file)"},
     {"; fbx", "an FBX file (export it as glTF)"},
     {"#usda", "a USD file (export it as glTF)"},
@@ -221,6 +222,11 @@ constexpr Beginning kBytes[] = {
     {whole("\x28\xb5\x2f\xfd"), "a Zstandard archive (unpack it first)"},
     {whole("%PDF-"), "a PDF"},
     {whole("Kaydara FBX Binary"), "an FBX file (export it as glTF)"},
+    {whole("8BPS"), "a Photoshop file (save it as PNG or TIFF)"},
+    {whole("b3dm"), "a tile of 3D Tiles (take the GLB out of it: npx 3d-tiles-tools b3dmToGlb)"},
+    {whole("i3dm"), "a tile of 3D Tiles (take the GLB out of it: npx 3d-tiles-tools i3dmToGlb)"},
+    {whole("cmpt"), "a tile of 3D Tiles (take the GLBs out of it: npx 3d-tiles-tools cmptToGlb)"},
+    {whole("pnts"), "a point cloud (3D Tiles): texmesh reads surfaces; mesh it first"},
     {whole("BLENDER"), "a Blender file (export it as glTF)"},
     {whole("PXR-USDC"), "a USD file (export it as glTF)"},
     {whole("LASF"), "a point cloud (LAS): texmesh reads surfaces; mesh it first"},
@@ -243,6 +249,8 @@ std::string foreign_file(std::span<const std::uint8_t> bytes) {
   std::string_view text = text_of(bytes.first(std::min(bytes.size(), kHeadBytes)));
   for (const Beginning& b : kBytes)
     if (text.starts_with(b.magic)) return b.what;
+  if (text.size() > 11 && (text.substr(4, 7) == "ftyphei" || text.substr(4, 7) == "ftyphev"))
+    return "an HEIC picture (save it as JPEG or PNG)";
   if (text.starts_with("\xef\xbb\xbf")) text.remove_prefix(3);
   const std::string words = lower(trim(text));
   for (const Beginning& b : kTexts)
