@@ -125,9 +125,8 @@ void check_output_file(const std::string& path) {
   if (std::filesystem::is_directory(file, error))
     throw InputError(path, "", "a file that can be written", "a folder");
   if (::access(folder_of_file(path).c_str(), W_OK) == 0) return;
-  if (errno == EACCES)
-    throw RightsError(path, "", "", std::string("cannot be written: ") + std::strerror(errno));
-  fail_to_write(path, "", errno);
+  if (errno == EACCES || errno == EPERM || errno == EROFS) fail_to_write(path, "", errno);
+  throw InputError(path, "", "", std::string("cannot be written: ") + std::strerror(errno));
 }
 
 void write_output_file(const std::string& path, ByteSpan bytes, const std::string& temporary) {

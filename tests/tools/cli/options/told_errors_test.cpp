@@ -6,6 +6,7 @@
 #include <stdexcept>
 #include <string>
 
+#include "pipeline/io/atomic_file.h"
 #include "pipeline/io/exit_codes.h"
 #include "tools/cli/options/units.h"
 
@@ -45,10 +46,12 @@ TEST(ToldErrors, EachKindHasItsCodeAndSaysWhatItFound) {
 
 TEST(ToldErrors, MissingRightsAreNoUsageError) {
   const auto asked = [](const auto& error) { return [&error]() -> int { throw error; }; };
-  const RightsError rights("scans", "", "", "cannot be listed");
+  const PermissionError rights("scans", "", "", "cannot be listed");
   const InputError name("scans", "", "", "cannot be listed");
   EXPECT_EQ(told_of([&] { return as_usage(asked(rights)); }).exit_code, kExitModelFailed);
   EXPECT_EQ(told_of([&] { return as_usage(asked(name)); }).exit_code, kExitUsage);
+  const auto no_folder = [] { return check_output_file("/nothing/there/x"), 0; };
+  EXPECT_EQ(told_of([&] { return as_usage(no_folder); }).exit_code, kExitUsage);
 }
 
 }  // namespace texmesh::told_errors_test
