@@ -68,7 +68,11 @@ std::string behind_links(const std::string& path) {
 }  // namespace
 
 std::string temporary_name(const std::string& path, std::size_t number) {
-  return path + std::string(kTemporaryMark) + owner_mark() + "-" + std::to_string(number);
+  const std::string mark = std::string(kTemporaryMark) + owner_mark() + "-" + std::to_string(number);
+  // A name that becomes too long loses its beginning: what is in the file is told by the ending.
+  const std::size_t name = path.rfind('/') + 1, bytes = path.size() - name;
+  const std::size_t most = NAME_MAX - std::min<std::size_t>(mark.size(), NAME_MAX);
+  return path.substr(0, name) + path.substr(name + bytes - std::min(bytes, most)) + mark;
 }
 
 void write_file_atomically(const std::string& path, ByteSpan bytes, const std::string& temporary) {
