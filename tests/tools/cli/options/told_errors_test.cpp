@@ -8,6 +8,7 @@
 
 #include "pipeline/io/atomic_file.h"
 #include "pipeline/io/exit_codes.h"
+#include "tests/support/command.h"
 #include "tools/cli/options/units.h"
 
 namespace texmesh::told_errors_test {
@@ -27,6 +28,17 @@ TEST(ToldErrors, WhatIsGivenIsTheExitCode) {
   const Told t = told_of([] { return 42; });
   EXPECT_EQ(t.exit_code, 42);
   EXPECT_EQ(t.text, "");
+}
+
+TEST(ToldErrors, WhatCannotBePrintedIsAnError) {
+  if (!std::filesystem::exists("/dev/full")) GTEST_SKIP() << "no /dev/full";
+  const auto printed_to = [](const std::string& where) {
+    return testing::run_command({"/bin/sh", "-c", TEXMESH_BINARY " --version " + where});
+  };
+  EXPECT_EQ(printed_to("> /dev/full").exit_code, kExitModelFailed);
+  EXPECT_NE(printed_to("> /dev/full").errors.find("standard output cannot be written"), std::string::npos);
+  EXPECT_EQ(printed_to(">&-").exit_code, kExitOk) << "nobody wants it";
+  EXPECT_EQ(printed_to("> /dev/null").exit_code, kExitOk);
 }
 
 TEST(ToldErrors, EachKindHasItsCodeAndSaysWhatItFound) {
