@@ -57,7 +57,7 @@ bool is_other_model(const std::string& path) {
 
 [[noreturn]] void fail_listing(const std::string& path, const std::error_code& ec) {
   const std::string found = "cannot be listed: " + ec.message();
-  if (ec == std::errc::permission_denied) throw RightsError(path, "", "", found);
+  if (ec == std::errc::permission_denied) throw PermissionError(path, "", "", found);
   throw InputError(path, "", "", found);
 }
 

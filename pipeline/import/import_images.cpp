@@ -42,16 +42,37 @@ void note_foreign_extension(Model& model, const Image& image, const std::string&
              image.name + " holds a " + image_format_name(image.format) + " and is read as one");
 }
 
+/// What is wrong with the colour profile that a picture has; "" for nothing.
+std::string fault_of_profile(const Image& image, const ImageMetadata& metadata) {
+  if (metadata.damaged_profile) return "it is damaged";
+  if (metadata.icc_profile.empty()) return "";
+  if (metadata.cmyk) return "profiles of CMYK are not read";
+  try {
+    changes_colours(image, FloatEncoding::kSrgb);
+    return "";
+  } catch (const InputError& e) {
+    return "expected " + e.expected() + ", found " + e.found();
+  }
+}
+
 /// What an image says beside its pixels: what is done about it, and that a user should know.
 void apply_metadata(Model& model, Image& image, const std::string& place, const ImportOptions& options) {
   const ImageMetadata metadata = read_image_metadata(image.format, image.bytes);
   image.honour_profile = options.colour_profiles != ProfilePolicy::kIgnore;
+  const std::string fault =
+      options.colour_profiles == ProfilePolicy::kAuto ? fault_of_profile(image, metadata) : "";
+  if (!fault.empty()) {
+    image.honour_profile = false;
+    add_warning(model.notes, "colour-profile-ignored", place,
+                image.name + " has an ICC profile that cannot be used (" + fault +
+                    "): where it gives colours its values are taken as sRGB");
+  }
   image.accept_damage = true;
   const char* what = metadata.damaged_profile        ? "a damaged ICC profile"
                      : !metadata.icc_profile.empty() ? "an ICC profile"
                      : metadata.gamma > 0            ? "a gamma"
                                                      : nullptr;
-  if (what && !image.honour_profile)
+  if (what && fault.empty() && !image.honour_profile)
     add_info(model.notes, "colour-profile-ignored", place,
              image.name + " has " + what + " that is ignored: its values are taken as sRGB");
   if (what && image.honour_profile)

@@ -111,6 +111,19 @@ void tell_what_is_lost(ImportedModel& imported) {
   add_to_source(imported.about, "lost", std::move(list));
 }
 
+/// "fox.fbx, fox.png and 3 more files"; an archive in an archive is told, and what to do.
+std::string other_files(const std::vector<ArchivedFile>& files) {
+  constexpr std::size_t kMostTold = 3;
+  std::string text;
+  for (const ArchivedFile& f : files)
+    if (lower_extension(f.name) == "zip")
+      return readable_name(f.name) + ", an archive in the archive: unpack the outer one and compile that";
+  for (std::size_t k = 0; k < std::min(files.size(), kMostTold); ++k)
+    text += (k ? ", " : "") + readable_name(files[k].name);
+  if (files.size() > kMostTold) text += " and " + std::to_string(files.size() - kMostTold) + " more";
+  return text.empty() ? "no file" : text + " alone";
+}
+
 /// The model of a ZIP archive, with what the archive says of it.
 ImportedModel import_archive(const std::string& file_name, ByteSpan bytes, const ImportOptions& options,
                              const RunContext& context) {
@@ -118,7 +131,7 @@ ImportedModel import_archive(const std::string& file_name, ByteSpan bytes, const
   ArchiveFiles archive(file_name, bytes, most);
   if (archive.model().empty())
     throw InputError(file_name, "", "an archive with a .gltf, .glb, .obj, .ply or .stl file",
-                     std::to_string(archive.files().size()) + " files of other kinds");
+                     other_files(archive.files()));
   const auto entry = std::ranges::find(archive.files(), archive.model(), &ArchivedFile::name);
   const std::string name = file_name + "/" + readable_name(archive.model());
   const Bytes model = archive.unpacked(*entry, most);

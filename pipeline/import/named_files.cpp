@@ -29,6 +29,7 @@ std::vector<std::string> readings_of(const NameInModel& name) {
   if (name.is_uri) {
     add(percent_decoded(name.text));
     add(name.text);
+    add(percent_decoded(name.text.substr(0, name.text.find('?'))));
     return readings;
   }
   add(std::string(without_quotes(name.text)));
@@ -94,7 +95,12 @@ class Finder {
            " is not there; " + quote(similar->name) + what + " is taken");
       return std::move(found_);
     }
+    if (read_moved()) return std::move(found_);
     if (found_.looked_for.empty()) found_.looked_for = "it names no file beneath the model's folder";
+    if (inside_.empty() && !beside_.empty())
+      found_.looked_for +=
+          " beneath the model's folder, which texmesh does not leave (a ZIP archive of both "
+          "folders shows it all)";
     return std::move(found_);
   }
 
@@ -125,6 +131,30 @@ class Finder {
     if (!found_.bytes)
       found_.looked_for += (found_.looked_for.empty() ? "looked for " : ", ") + quote(name) + refused;
     return found_.bytes.has_value();
+  }
+
+  /// Who moves a model often leaves its pictures behind, or puts them into a folder of their own.
+  bool read_moved() {
+    const std::string looked_for = found_.looked_for;
+    const std::string_view said_in = name_.said_in;
+    const std::string folder(said_in.substr(0, said_in.find_last_of('/') + 1));
+    std::vector<std::string> moved;
+    for (const auto* names : {&inside_, &beside_})
+      for (const std::string& name : *names)
+        for (const std::string& from : {folder, std::string()})
+          for (const char* of : {"", "textures", "Textures", "tex", "maps", "images"})
+            add(moved, beneath_model(from + of, last_part(name)));
+    std::erase_if(moved, [this](const std::string& name) {
+      return std::ranges::find(inside_, name) != inside_.end() ||
+             std::ranges::find(beside_, name) != beside_.end();
+    });
+    for (const std::string& name : moved)
+      if (read(name)) {
+        warn("moved-file", " is not there; " + quote(name) + ", a file of the same last part, is taken");
+        return true;
+      }
+    found_.looked_for = looked_for;
+    return false;
   }
 
   struct Similar {
@@ -169,6 +199,7 @@ constexpr Beginning kTexts[] = {
     {"<!doctype html", "an HTML page, as servers send in the place of a file"},
     {"<html", "an HTML page, as servers send in the place of a file"},
     {"<?xml", "an XML file"},
+    {"<svg", "an SVG drawing (export it as PNG)"},
     {"outs:", "a DVC pointer (dvc pull fetches the file)"},
     {"; fbx", "an FBX file (export it as glTF)"},
     {"#usda", "a USD file (export it as glTF)"},
@@ -191,6 +222,11 @@ constexpr Beginning kBytes[] = {
     {whole("\x28\xb5\x2f\xfd"), "a Zstandard archive (unpack it first)"},
     {whole("%PDF-"), "a PDF"},
     {whole("Kaydara FBX Binary"), "an FBX file (export it as glTF)"},
+    {whole("8BPS"), "a Photoshop file (save it as PNG or TIFF)"},
+    {whole("b3dm"), "a tile of 3D Tiles (take the GLB out of it: npx 3d-tiles-tools b3dmToGlb)"},
+    {whole("i3dm"), "a tile of 3D Tiles (take the GLB out of it: npx 3d-tiles-tools i3dmToGlb)"},
+    {whole("cmpt"), "a tile of 3D Tiles (take the GLBs out of it: npx 3d-tiles-tools cmptToGlb)"},
+    {whole("pnts"), "a point cloud (3D Tiles): texmesh reads surfaces; mesh it first"},
     {whole("BLENDER"), "a Blender file (export it as glTF)"},
     {whole("PXR-USDC"), "a USD file (export it as glTF)"},
     {whole("LASF"), "a point cloud (LAS): texmesh reads surfaces; mesh it first"},
@@ -213,6 +249,8 @@ std::string foreign_file(std::span<const std::uint8_t> bytes) {
   std::string_view text = text_of(bytes.first(std::min(bytes.size(), kHeadBytes)));
   for (const Beginning& b : kBytes)
     if (text.starts_with(b.magic)) return b.what;
+  if (text.size() > 11 && (text.substr(4, 7) == "ftyphei" || text.substr(4, 7) == "ftyphev"))
+    return "an HEIC picture (save it as JPEG or PNG)";
   if (text.starts_with("\xef\xbb\xbf")) text.remove_prefix(3);
   const std::string words = lower(trim(text));
   for (const Beginning& b : kTexts)

@@ -23,8 +23,8 @@ struct NamedFile {
 
 /// Finds the file that a name means. The same rules hold for every format and every kind of name:
 /// - Blanks around the name and one pair of quotes are no part of it. Backslashes are slashes. In a URI %41
-///   is A; a URI is also tried as it is written, another name also as if it were one. What follows a blank
-///   and # is a comment where the whole is no file.
+///   is A; a URI is also tried as it is written and without a query, another name also as if it were one.
+///   What follows a blank and # is a comment where the whole is no file.
 /// - The name counts from the folder of the file that says it, then from the model's.
 /// - An absolute name, a drive, a scheme, a server, and what leaves the model's folder once ".." is resolved
 ///   are never followed. A file of the name's last part, in the same two folders, is taken with the warning
@@ -32,6 +32,9 @@ struct NamedFile {
 /// - Where all of this finds nothing, the only file whose name differs in case or composition alone is taken
 ///   with the warning "similar-name"; where there is none, the only picture whose ending differs, too, with
 ///   "other-ending".
+/// - Last, the file of the name's last part in the same two folders, or in their folder textures, Textures,
+/// tex,
+///   maps or images, is taken with the warning "moved-file".
 /// What must not be read counts as missing. InputError when the file is longer than max_bytes.
 NamedFile find_file(const NameInModel& name, Resolver& resolver, std::uint64_t max_bytes, Notes& notes,
                     const std::string& place);

@@ -68,7 +68,11 @@ std::string behind_links(const std::string& path) {
 }  // namespace
 
 std::string temporary_name(const std::string& path, std::size_t number) {
-  return path + std::string(kTemporaryMark) + owner_mark() + "-" + std::to_string(number);
+  const std::string mark = std::string(kTemporaryMark) + owner_mark() + "-" + std::to_string(number);
+  // A name that becomes too long loses its beginning: what is in the file is told by the ending.
+  const std::size_t name = path.rfind('/') + 1, bytes = path.size() - name;
+  const std::size_t most = NAME_MAX - std::min<std::size_t>(mark.size(), NAME_MAX);
+  return path.substr(0, name) + path.substr(name + bytes - std::min(bytes, most)) + mark;
 }
 
 void write_file_atomically(const std::string& path, ByteSpan bytes, const std::string& temporary) {
@@ -125,9 +129,8 @@ void check_output_file(const std::string& path) {
   if (std::filesystem::is_directory(file, error))
     throw InputError(path, "", "a file that can be written", "a folder");
   if (::access(folder_of_file(path).c_str(), W_OK) == 0) return;
-  if (errno == EACCES)
-    throw RightsError(path, "", "", std::string("cannot be written: ") + std::strerror(errno));
-  fail_to_write(path, "", errno);
+  if (errno == EACCES || errno == EPERM || errno == EROFS) fail_to_write(path, "", errno);
+  throw InputError(path, "", "", std::string("cannot be written: ") + std::strerror(errno));
 }
 
 void write_output_file(const std::string& path, ByteSpan bytes, const std::string& temporary) {

@@ -24,8 +24,8 @@ bool is_special_file(const std::string& path);
 /// what it leads to (atomically, and the link stays); else as write_file_atomically.
 void write_output_file(const std::string& path, ByteSpan bytes, const std::string& temporary = "");
 
-/// Throws InputError when write_output_file() could not write there, RightsError where this user may not: for
-/// commands that work long before they do.
+/// Throws InputError when write_output_file() could not write there, PermissionError where this user may not:
+/// for commands that work long before they do.
 void check_output_file(const std::string& path);
 
 /// The name of a temporary sibling of `path`. It says which process of which machine writes it

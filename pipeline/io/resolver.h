@@ -52,12 +52,8 @@ struct ResourceError : InputError {
   using InputError::InputError;
 };
 
-/// A path that was asked for is there, and this user has no rights to it: no usage error (as_usage()).
-struct RightsError : InputError {
-  using InputError::InputError;
-};
-
-/// What this user may not do here. Another moment does not help, another user or another place may.
+/// What this user may not do here: no usage error (as_usage()). Another moment does not help, another user or
+/// another place may.
 struct PermissionError : ResourceError {
   using ResourceError::ResourceError;
 };

@@ -382,9 +382,8 @@ int run_render(const RenderArguments& args) {
 
 void add_render_options(Command& c, RenderArguments& args) {
   c.option("INPUT", args.input,
-           "A model that compile takes (glTF, GLB, OBJ, PLY, STL, range scan), or a package: a .texmesh file "
-           "or a "
-           "folder that unpack made")
+           "A model that compile takes (glTF, GLB, OBJ, PLY, STL, ZIP archive, range scan), or a package: a "
+           ".texmesh file or a folder that unpack made")
       .required();
   c.option(
        "-o,--output", args.output,

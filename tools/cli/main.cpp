@@ -1,4 +1,7 @@
 // texmesh: every command, and the workers that compile starts (pipeline/compile/workers/worker_child.cpp).
+#include <fcntl.h>
+#include <unistd.h>
+
 #include "format/container/layout.h"
 #include "pipeline/compile/options.h"
 #include "pipeline/compile/workers/worker.h"
@@ -46,11 +49,19 @@ void add_commands(Command& program, const std::string& first_word) {
   }
 }
 
+/// Where one is closed, the next file to be opened would take its place, and what is printed would go into
+/// it.
+void open_standard_files() {
+  for (const int file : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO})
+    if (::fcntl(file, F_GETFD) < 0 && ::open("/dev/null", O_RDWR) < 0) return;
+}
+
 }  // namespace
 }  // namespace texmesh
 
 int main(int argc, char** argv) {
   using namespace texmesh;
+  open_standard_files();
   std::vector<char*> words(argv, argv + argc);
   static char help[] = "--help", version[] = "--version";
   if (argc > 1 && argv[1] == std::string("help")) words.erase(words.begin() + 1), words.push_back(help);

@@ -26,10 +26,12 @@ bool is_package(const std::string& path) {
   namespace fs = std::filesystem;
   std::error_code ec;
   if (fs::is_directory(path, ec)) return fs::exists(fs::path(path) / kManifestPath, ec);
+  // Any other ZIP archive may hold a model.
+  constexpr std::size_t kNameAt = 30;
+  std::string head(kNameAt + std::strlen(kManifestPath), '\0');
   std::ifstream in(path, std::ios::binary);
-  char magic[4]{};
-  in.read(magic, 4);
-  return in.gcount() == 4 && std::equal(magic, magic + 4, "PK\x03\x04");
+  in.read(head.data(), static_cast<std::streamsize>(head.size()));
+  return head.starts_with("PK\3\4") && (head.ends_with(kManifestPath) || path.ends_with(".texmesh"));
 }
 
 ImportedModel finest_scale(PackageReader& package, const RunContext& context) {

@@ -92,7 +92,8 @@ bool leaves_archive(const std::string& name) {
 std::string archived_name(const std::string& name) { return name.substr(name.rfind('/') + 1); }
 
 bool is_addition_of_macos(const std::string& name) {
-  return name.starts_with("__MACOSX/") || archived_name(name) == ".DS_Store";
+  return name.starts_with("__MACOSX/") || name.find("/__MACOSX/") != name.npos ||
+         archived_name(name).starts_with("._") || archived_name(name) == ".DS_Store";
 }
 
 /// The next file of the directory; one without a name is none to read.
@@ -313,7 +314,7 @@ Bytes ArchiveFiles::unpacked(const ArchivedFile& file, std::uint64_t max_bytes) 
   else if (file.method == kDeflated)
     out = inflated(std::move(packed), file.bytes);
   else
-    refuse_archive(*source_, place, "a file that is stored or deflated",
+    refuse_archive(*source_, place, "a file that is stored or deflated (unpack the archive first)",
                    "packing of kind " + std::to_string(file.method));
   const auto step = [](uLong crc, ByteSpan bytes) { return crc32_z(crc, bytes.data(), bytes.size()); };
   if (out.size() != file.bytes || (out.empty() ? 0 : step(0, out)) != file.crc32)
@@ -323,8 +324,9 @@ Bytes ArchiveFiles::unpacked(const ArchivedFile& file, std::uint64_t max_bytes) 
 }
 
 std::optional<Bytes> ArchiveFiles::read(const std::string& uri, std::uint64_t max_bytes) {
-  const auto exact = std::ranges::find(files_, folder_ + uri, &ArchivedFile::name);
-  if (exact != files_.end()) return unpacked(*exact, max_bytes);
+  for (const std::string& whole : {folder_ + uri, uri})
+    if (const auto exact = std::ranges::find(files_, whole, &ArchivedFile::name); exact != files_.end())
+      return unpacked(*exact, max_bytes);
   const ArchivedFile* only = nullptr;
   for (const ArchivedFile& f : files_) {
     if (archived_name(f.name) != archived_name(uri)) continue;
@@ -337,12 +339,15 @@ std::optional<Bytes> ArchiveFiles::read(const std::string& uri, std::uint64_t ma
 std::vector<std::string> ArchiveFiles::similar(const std::string& uri) {
   std::vector<std::string> out;
   const std::string key = similar_key(uri), key_of_last = similar_key(archived_name(uri));
+  const auto is_named_once = [this](const std::string& last) {
+    return std::ranges::count(files_, last, [](const ArchivedFile& f) { return archived_name(f.name); }) == 1;
+  };
   for (const ArchivedFile& f : files_) {
     const bool is_below = f.name.starts_with(folder_) && f.name != folder_ + uri;
     if (is_below && similar_key(f.name.substr(folder_.size())) == key)
       out.push_back(f.name.substr(folder_.size()));
-    else if (similar_key(archived_name(f.name)) == key_of_last)
-      out.push_back(archived_name(f.name));
+    else if (const std::string last = archived_name(f.name); similar_key(last) == key_of_last)
+      out.push_back(is_named_once(last) ? last : f.name);
   }
   std::ranges::sort(out);
   out.erase(std::unique(out.begin(), out.end()), out.end());  // clang 14, which fuzzes, has no ranges::unique

@@ -413,6 +413,19 @@ bool is_supported(const std::string& extension) {
          std::find(kSupported.begin(), kSupported.end(), extension) != kSupported.end();
 }
 
+/// What leaves the mesh and its textures as they are: lights, variants, words about parts. Viewers show such
+/// a file though it requires them.
+bool is_beside_the_surface(const std::string& extension) {
+  static constexpr std::string_view kSuch[] = {
+      "KHR_lights_punctual",      "KHR_animation_pointer",   "KHR_xmp",
+      "KHR_xmp_json_ld",          "KHR_node_visibility",     "KHR_interactivity",
+      "EXT_mesh_features",        "EXT_structural_metadata", "EXT_instance_features",
+      "EXT_feature_metadata",     "EXT_lights_image_based",  "CESIUM_RTC",
+      "CESIUM_primitive_outline", "AGI_articulations",       "MSFT_lod"};
+  return extension.find("_materials_") != extension.npos ||
+         std::ranges::find(kSuch, extension) != std::end(kSuch);
+}
+
 void GltfReader::check_document() const {
   const tinygltf::Asset& asset = structure_.asset;
   if (!asset.version.starts_with("2.")) source_.fail("/asset/version", "2.0", quote(asset.version));
@@ -425,7 +438,9 @@ void GltfReader::check_document() const {
         tell("/" + list + "/" + std::to_string(i), name);
   };
   each_unknown("extensionsRequired", [&](const std::string& place, const std::string& name) {
-    source_.fail(place, "an extension that texmesh reads", quote(name));
+    if (!is_beside_the_surface(name)) source_.fail(place, "an extension that texmesh reads", quote(name));
+    add_warning(source_.notes, "required-extension", place,
+                name + ", which the file requires, is left out: the surface is shown without it");
   });
   const GltfJson images = document_.value("images", GltfJson::array());
   for (std::size_t i = 0; i < images.size(); ++i)

@@ -49,18 +49,20 @@ ByteSpan Buffers::buffer(std::size_t index) {
   if (length > bytes.size()) {
     if (const std::string foreign = foreign_file(bytes); !foreign.empty())
       source_.fail(place, "a buffer of " + std::to_string(length) + " bytes", foreign);
-    source_.fail(place + "/byteLength",
-                 "at most " + std::to_string(bytes.size()) + " bytes (a file that is cut off has fewer)",
-                 std::to_string(length));
+    source_.note_once(Severity::kWarning, "short-buffer", place + "/byteLength",
+                      "the buffer has " + std::to_string(bytes.size()) + " bytes, " + std::to_string(length) +
+                          " were said; what lies within them is read");
   }
-  return bytes.first(length);
+  return bytes.first(std::min<std::uint64_t>(length, bytes.size()));
 }
 
 ByteSpan Buffers::range(std::size_t buffer_index, std::uint64_t offset, std::uint64_t length,
                         const std::string& place) {
   const ByteSpan bytes = buffer(buffer_index);
   if (offset > bytes.size() || length > bytes.size() - offset) {
-    source_.fail(place, "a range within the " + std::to_string(bytes.size()) + " bytes of its buffer",
+    source_.fail(place,
+                 "a range within the " + std::to_string(bytes.size()) + " bytes of /buffers/" +
+                     std::to_string(buffer_index) + " (a file that is cut off has fewer)",
                  std::to_string(length) + " bytes at " + std::to_string(offset));
   }
   return bytes.subspan(offset, length);

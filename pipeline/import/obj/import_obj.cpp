@@ -2,7 +2,6 @@
 #include "pipeline/import/import_images.h"
 #include "pipeline/import/material_images.h"
 #include "pipeline/import/mesh_builder.h"
-#include "pipeline/import/named_files.h"
 #include "pipeline/import/obj/obj_material.h"
 #include "pipeline/import/text_scan.h"
 
@@ -333,93 +332,6 @@ ObjData read_obj(const std::string& file, std::string_view text, const ImportOpt
 
 // The materials that a file names.
 
-struct LoadedLibrary {
-  std::string name;
-  MtlFile file;
-  std::map<std::string, std::size_t> by_name;  // the first material so named
-
-  /// `name` as an OBJ uses it; what follows a blank and # may be a comment, here and in the library.
-  const MtlMaterial* find(const std::string& wanted) const {
-    auto it = by_name.find(wanted);
-    if (it == by_name.end()) it = by_name.find(without_comment(wanted));
-    return it == by_name.end() ? nullptr : &file.materials[it->second];
-  }
-
-  LoadedLibrary(std::string library_name, MtlFile library_file)
-      : name(std::move(library_name)), file(std::move(library_file)) {
-    for (std::size_t i = 0; i < file.materials.size(); ++i) by_name.try_emplace(file.materials[i].name, i);
-    for (std::size_t i = 0; i < file.materials.size(); ++i)
-      by_name.try_emplace(without_comment(file.materials[i].name), i);
-  }
-  static std::string without_comment(std::string_view name) {
-    return std::string(trim(name.substr(0, name.find(" #"))));
-  }
-};
-
-struct FoundMaterial {
-  const MtlMaterial* material = nullptr;  // nullptr = in no library
-  const LoadedLibrary* library = nullptr;
-};
-FoundMaterial find_material(const std::vector<LoadedLibrary>& libraries, const std::string& name) {
-  for (const LoadedLibrary& library : libraries)
-    if (const MtlMaterial* material = library.find(name)) return {material, &library};
-  return {};
-}
-
-class LibraryLoader {
- public:
-  LibraryLoader(const std::string& file, Model& model, Resolver& resolver, const ImportOptions& options)
-      : own_name_(file.substr(0, file.rfind('.')) + ".mtl"),
-        model_(model),
-        resolver_(resolver),
-        max_bytes_(static_cast<std::uint64_t>(options.max_file_bytes)) {}
-
-  /// `mtllib a.mtl b.mtl` names two files, `mtllib my scan.mtl` one: the whole is tried first.
-  void load(const ObjData::Library& library) {
-    place_ = "line " + std::to_string(library.line);
-    const std::vector<std::string> names = names_of_libraries(library.name);
-    if (names.empty()) return;
-    const std::string whole = load_one(library.name);
-    if (whole.empty() || names.size() == 1) return missing(library.name, whole);
-    std::vector<std::pair<std::string, std::string>> absent;
-    for (const std::string& name : names)
-      if (const std::string looked_for = load_one(name); !looked_for.empty())
-        absent.emplace_back(name, looked_for);
-    if (absent.size() == names.size()) return missing(library.name, whole);
-    for (const auto& [name, looked_for] : absent) missing(name, looked_for);
-  }
-  std::vector<LoadedLibrary> take() { return std::move(loaded_); }
-
- private:
-  /// Where it was looked for; "" when it was found.
-  std::string load_one(const std::string& name) {
-    NamedFile found = find_file({name, "", false}, resolver_, max_bytes_, model_.notes, place_);
-    if (!found.bytes) return found.looked_for;
-    if (const std::string foreign = foreign_file(*found.bytes); !foreign.empty())
-      return quote(found.name) + " is " + foreign;
-    loaded_.emplace_back(found.name, read_mtl(found.name, *found.bytes, model_.notes));
-    return "";
-  }
-  /// Who renames a model and its library forgets the line that names it.
-  void missing(const std::string& name, const std::string& looked_for) {
-    if (looked_for.empty()) return;
-    if (loaded_.empty() && load_one(own_name_).empty())
-      return add_warning(model_.notes, "renamed-mtl", place_,
-                         "material library " + quote(name) + " is not there; " + quote(loaded_[0].name) +
-                             ", which is named after the model, is taken");
-    add_warning(
-        model_.notes, "missing-mtl", place_,
-        "material library " + quote(name) + " not found: " + looked_for + "; its materials stay untextured");
-  }
-
-  const std::string own_name_;  // of a library that is named after the model
-  Model& model_;
-  Resolver& resolver_;
-  const std::uint64_t max_bytes_;
-  std::string place_;
-  std::vector<LoadedLibrary> loaded_;
-};
-
 /// The UDIM tile that a face lies in.
 std::uint16_t tile_of(const ObjData& data, std::size_t face) {
   Vec2d sum;
@@ -467,6 +379,34 @@ void split_into_tiles(ObjData& data, const std::vector<bool>& tiled, const std::
   warn_of_tiles(notes, file, made.size(), left_out);
 }
 
+/// Where faces name one material, or none, and the libraries have one, of another name: who renames a
+/// material in one of two files means it.
+void take_only_material(ObjData& data, const std::vector<LoadedLibrary>& libraries, const std::string& file,
+                        Notes& notes) {
+  if (libraries.size() != 1 || libraries[0].file.materials.size() != 1) return;
+  const std::uint16_t used = data.faces[0].material;
+  const auto is_used = [used](const ObjFace& f) { return f.material == used; };
+  std::string& name = data.materials[used];
+  const std::string& only = libraries[0].file.materials[0].name;
+  if (libraries[0].find(name) || !std::ranges::all_of(data.faces, is_used)) return;
+  add_warning(notes, "other-material", file,
+              (name.empty() ? "faces name no material" : "material " + quote(name) + " is in no library") +
+                  "; " + quote(only) + ", the only one of " + quote(libraries[0].name) + ", is taken");
+  name = only;
+}
+
+/// "are "skin", "base" and 3 more".
+std::string names_of_materials(const std::vector<LoadedLibrary>& libraries) {
+  constexpr std::size_t kMostTold = 3;
+  std::string text;
+  std::size_t count = 0;
+  for (const LoadedLibrary& library : libraries)
+    for (const MtlMaterial& material : library.file.materials)
+      if (count++ < kMostTold) text += (text.empty() ? "are " : ", ") + quote(material.name);
+  if (count > kMostTold) text += " and " + std::to_string(count - kMostTold) + " more";
+  return text.empty() ? "are none" : text;
+}
+
 Material make_material(const std::string& name, std::uint16_t tile,
                        const std::vector<LoadedLibrary>& libraries, bool any_library, const std::string& file,
                        Model& model, Resolver& resolver, const ImportOptions& options) {
@@ -474,8 +414,9 @@ Material make_material(const std::string& name, std::uint16_t tile,
     return material_from_mtl(tile == 0 ? *material : of_tile(*material, tile), library->file, library->name,
                              model, resolver, options);
   if (!libraries.empty())
-    add_warning(model.notes, "missing-material", file,
-                "material " + quote(name) + " is in no material library");
+    add_warning(
+        model.notes, "missing-material", file,
+        "material " + quote(name) + " is in no material library; there " + names_of_materials(libraries));
   else if (!any_library)
     add_warning(model.notes, "missing-material", file,
                 "material " + quote(name) + " is used but no mtllib names a library");
@@ -490,15 +431,19 @@ void add_obj_materials(ObjData& data, const std::string& file, Model& model, Res
   for (const ObjData::Library& library : data.libraries) {
     const auto same = [&library](const ObjData::Library& other) { return other.name == library.name; };
     const auto first = std::find_if(data.libraries.begin(), data.libraries.end(), same);
-    if (&*first == &library) loader.load(library);
+    if (&*first == &library) loader.load(library.name, library.line);
   }
   const std::vector<LoadedLibrary> libraries = loader.take();
   for (const LoadedLibrary& library : libraries)
     for (const auto& [word, count] : library.file.unread)
       lost["statements " + quote(word) + " of materials"] += count;
+  if (!loader.any_missing()) take_only_material(data, libraries, file, model.notes);
   split_into_tiles(data, find_tiled(data, libraries, resolver, options), file, model.notes);
   std::vector<std::uint8_t> used(data.materials.size(), 0);
   for (const ObjFace& f : data.faces) used[f.material] = 1;
+  if (used[0] && data.materials[0].empty() && !libraries.empty())
+    add_warning(model.notes, "missing-material", file,
+                "faces name no material (usemtl); there " + names_of_materials(libraries));
   for (std::size_t i = 0; i < data.materials.size(); ++i) {
     // Textures of materials without faces are never asked for.
     const bool named = used[i] && !(i == 0 && data.materials[0].empty());

@@ -3,6 +3,7 @@
 #include "pipeline/import/import_images.h"
 #include "pipeline/import/material_images.h"
 #include "pipeline/import/mesh_builder.h"
+#include "pipeline/import/named_files.h"
 #include "pipeline/import/text_scan.h"
 
 namespace texmesh {
@@ -75,18 +76,30 @@ class MtlReader {
       if (!word.empty() && word.front() == '#') {
         if (lower(line.substr(0, 200)).find("meshlab") != std::string::npos) file_.by_meshlab = true;
       } else if (same_word(word, "newmtl")) {
-        if (file_.materials.size() >= kMaxObjMaterials)
-          throw InputError(name_, lines_.place(),
-                           "at most " + std::to_string(kMaxObjMaterials) + " materials", "more");
-        file_.materials.emplace_back().name = trim(rest);
+        begin(std::string(trim(rest)));
       } else if (!file_.materials.empty()) {
-        statement(lower(word), rest, file_.materials.back());
+        statement(lower(word), rest, file_.materials[current_]);
       }
     }
     return std::move(file_);
   }
 
  private:
+  /// A name that is there already goes on, as in most readers: later statements stand.
+  void begin(const std::string& material) {
+    const auto [at, is_new] = number_of_.try_emplace(material, file_.materials.size());
+    current_ = at->second;
+    if (!is_new && !std::exchange(repeated_, true))
+      add_warning(notes_, "repeated-material", name_ + " " + lines_.place(),
+                  "material " + quote(material) +
+                      " is there already; what stands here is added to it, or set over it");
+    if (!is_new) return;
+    if (file_.materials.size() >= kMaxObjMaterials)
+      throw InputError(name_, lines_.place(), "at most " + std::to_string(kMaxObjMaterials) + " materials",
+                       "more");
+    file_.materials.emplace_back().name = material;
+  }
+
   std::optional<double> number(std::string_view rest) {
     double x = 0;
     std::string_view token = next_token(rest);
@@ -148,7 +161,9 @@ class MtlReader {
   LineReader lines_;
   Notes& notes_;
   MtlFile file_;
-  bool warned_ = false;
+  std::map<std::string, std::size_t> number_of_;  // of materials
+  std::size_t current_ = 0;
+  bool warned_ = false, repeated_ = false;
 };
 
 // ---- to glTF
@@ -264,6 +279,10 @@ struct Converter {
   }
 };
 
+std::string without_comment(std::string_view name) {
+  return std::string(trim(name.substr(0, name.find(" #"))));
+}
+
 }  // namespace
 
 MtlMaterial of_tile(MtlMaterial material, std::uint16_t tile) {
@@ -289,6 +308,69 @@ std::vector<std::string> names_of_libraries(std::string_view rest) {
 MtlFile read_mtl(const std::string& name, std::span<const std::uint8_t> bytes, Notes& notes) {
   const SourceText text(text_of(bytes), name, notes);
   return MtlReader(name, text.text(), notes).read();
+}
+
+LoadedLibrary::LoadedLibrary(std::string library_name, MtlFile library_file)
+    : name(std::move(library_name)), file(std::move(library_file)) {
+  for (std::size_t i = 0; i < file.materials.size(); ++i) by_name.try_emplace(file.materials[i].name, i);
+  for (std::size_t i = 0; i < file.materials.size(); ++i)
+    by_name.try_emplace(without_comment(file.materials[i].name), i);
+}
+
+const MtlMaterial* LoadedLibrary::find(const std::string& wanted) const {
+  auto it = by_name.find(wanted);
+  if (it == by_name.end()) it = by_name.find(without_comment(wanted));
+  return it == by_name.end() ? nullptr : &file.materials[it->second];
+}
+
+FoundMaterial find_material(const std::vector<LoadedLibrary>& libraries, const std::string& name) {
+  for (const LoadedLibrary& library : libraries)
+    if (const MtlMaterial* material = library.find(name)) return {material, &library};
+  return {};
+}
+
+LibraryLoader::LibraryLoader(const std::string& file, Model& model, Resolver& resolver,
+                             const ImportOptions& options)
+    : own_name_(file.substr(0, file.rfind('.')) + ".mtl"),
+      model_(model),
+      resolver_(resolver),
+      max_bytes_(static_cast<std::uint64_t>(options.max_file_bytes)) {}
+
+void LibraryLoader::load(const std::string& line_names, std::size_t line) {
+  place_ = "line " + std::to_string(line);
+  const std::vector<std::string> names = names_of_libraries(line_names);
+  if (names.empty()) return;
+  const std::string whole = load_one(line_names);
+  if (whole.empty() || names.size() == 1) return missing(line_names, whole);
+  std::vector<std::pair<std::string, std::string>> absent;
+  for (const std::string& name : names)
+    if (const std::string looked_for = load_one(name); !looked_for.empty())
+      absent.emplace_back(name, looked_for);
+  if (absent.size() == names.size()) return missing(line_names, whole);
+  for (const auto& [name, looked_for] : absent) missing(name, looked_for);
+}
+
+/// Where it was looked for; "" when it was found.
+std::string LibraryLoader::load_one(const std::string& name) {
+  NamedFile found = find_file({name, "", false}, resolver_, max_bytes_, model_.notes, place_);
+  if (!found.bytes) return found.looked_for;
+  if (const std::string foreign = foreign_file(*found.bytes); !foreign.empty())
+    return quote(found.name) + " is " + foreign;
+  loaded_.emplace_back(found.name, read_mtl(found.name, *found.bytes, model_.notes));
+  return "";
+}
+
+/// Who renames a model and its library forgets the line that names it.
+void LibraryLoader::missing(const std::string& name, const std::string& looked_for) {
+  if (looked_for.empty()) return;
+  if (loaded_.empty() && load_one(own_name_).empty())
+    return add_warning(model_.notes, "renamed-mtl", place_,
+                       "material library " + quote(name) + " is not there; " + quote(loaded_[0].name) +
+                           ", which is named after the model, is taken");
+  any_missing_ = true;
+  add_warning(
+      model_.notes, "missing-mtl", place_,
+      "material library " + quote(name) + " not found: " + looked_for + "; its materials stay untextured");
 }
 
 Material material_from_mtl(const MtlMaterial& mtl, const MtlFile& file, const std::string& mtl_name,

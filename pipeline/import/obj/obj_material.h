@@ -49,6 +49,46 @@ std::vector<std::string> names_of_libraries(std::string_view rest);
 /// are looks, not geometry) with one warning.
 MtlFile read_mtl(const std::string& name, std::span<const std::uint8_t> bytes, Notes& notes);
 
+/// A library that an OBJ names, read.
+struct LoadedLibrary {
+  LoadedLibrary(std::string library_name, MtlFile library_file);
+  /// `name` as an OBJ uses it; what follows a blank and # may be a comment, here and in the library. nullptr
+  /// = none.
+  const MtlMaterial* find(const std::string& wanted) const;
+
+  std::string name;
+  MtlFile file;
+  std::map<std::string, std::size_t> by_name;  // the first material so named
+};
+
+struct FoundMaterial {
+  const MtlMaterial* material = nullptr;  // nullptr = in no library
+  const LoadedLibrary* library = nullptr;
+};
+FoundMaterial find_material(const std::vector<LoadedLibrary>& libraries, const std::string& name);
+
+/// Reads the libraries that an OBJ names. What is not there gives a warning.
+class LibraryLoader {
+ public:
+  LibraryLoader(const std::string& file, Model& model, Resolver& resolver, const ImportOptions& options);
+  /// `mtllib a.mtl b.mtl` names two files, `mtllib my scan.mtl` one: the whole is tried first.
+  void load(const std::string& names, std::size_t line);
+  std::vector<LoadedLibrary> take() { return std::move(loaded_); }
+  bool any_missing() const { return any_missing_; }
+
+ private:
+  std::string load_one(const std::string& name);
+  void missing(const std::string& name, const std::string& looked_for);
+
+  const std::string own_name_;  // of a library that is named after the model
+  Model& model_;
+  Resolver& resolver_;
+  const std::uint64_t max_bytes_;
+  std::string place_;
+  std::vector<LoadedLibrary> loaded_;
+  bool any_missing_ = false;
+};
+
 /// The glTF material, images added to the model. Decisions where MTL is vague:
 /// - Kd and Ke are sRGB, as the viewers that made MTL common show them. Kd beside a texture follows
 ///   options.obj_kd.

@@ -16,9 +16,9 @@
 //              the texture, and the latter go with the faces in order; without comments the textures are
 //              STEM_0.jpg, STEM_1.jpg ...
 // What else stands in a file is counted and said.
-// UVs run upwards as in OBJ. Colours are sRGB, integers in the range of their type and floats in 0..1.
-// Colours beside a texture are a second record of the same surface: as in MeshLab, the texture shows and the
-// colours do not.
+// Names of properties may be written in any case. UVs run upwards as in OBJ. Colours are sRGB, integers in
+// the range of their type and floats in 0..1, or where one is far larger in 0..255. Colours beside a texture
+// are a second record of the same surface: as in MeshLab, the texture shows and the colours do not.
 
 namespace texmesh {
 namespace {
@@ -87,8 +87,11 @@ struct ColourColumns {
     for (std::size_t i = 0; i < 256; ++i) table[i] = linear_from_srgb(static_cast<double>(i) / 255.0);
     if (!any()) column.fill(-1);
   }
+  bool is_float() const { return any() && scale[0] == 1; }
   bool any() const { return column[0] >= 0 && column[1] >= 0 && column[2] >= 0; }
+  /// Floats stay as they are until the largest is known: to_linear().
   float linear(double value, double unit) const {
+    if (unit == 1) return static_cast<float>(value);
     if (unit == 1 / 255.0 && value >= 0 && value <= 255 && value == std::floor(value))
       return table[static_cast<std::size_t>(value)];
     return linear_from_srgb(value * unit);
@@ -97,6 +100,16 @@ struct ColourColumns {
     auto value = [&](std::size_t i) { return row.values[static_cast<std::size_t>(column[i])]; };
     return {linear(value(0), scale[0]), linear(value(1), scale[1]), linear(value(2), scale[2]),
             column[3] >= 0 ? static_cast<float>(value(3) * scale[3]) : 1.0f};
+  }
+  /// Floats of one element, as read: sRGB in 0..1, or in 0..255 where one is far beyond 1.
+  static void to_linear(std::span<Vec4f> colours) {
+    constexpr float kLargestOvershoot = 16;
+    float largest = 0;
+    for (const Vec4f& c : colours) largest = std::max({largest, c.x, c.y, c.z});
+    const double unit = largest > kLargestOvershoot ? 1 / 255.0 : 1;
+    for (Vec4f& c : colours)
+      c = {linear_from_srgb(c.x * unit), linear_from_srgb(c.y * unit), linear_from_srgb(c.z * unit),
+           c.w > 1 ? static_cast<float>(c.w * unit) : c.w};
   }
 };
 
@@ -286,6 +299,7 @@ class SurfaceReader {
       if (has_uv) surface_.vertices.uv.push_back(flipped(value(st[0]), value(st[1])));
       if (colours.any()) surface_.vertices.colours.push_back(colours.read(row_));
     }
+    if (colours.is_float()) ColourColumns::to_linear(surface_.vertices.colours);
   }
 
   static Vec2f flipped(double u, double v) { return {static_cast<float>(u), static_cast<float>(1 - v)}; }
@@ -303,6 +317,7 @@ class SurfaceReader {
     if (corners < 0) throw InputError(file_, "element face", "a list vertex_indices", "none");
     const int texcoord = find_list(element, {"texcoord"}), texnumber = find_scalar(element, {"texnumber"});
     const ColourColumns colours(element);
+    const std::size_t before = surface_.faces.index.size();
     count_unread(element, {corners, texcoord, texnumber}, &colours);
     for (std::uint64_t i = 0; i < element.count; ++i) {
       check_cancelled(i);
@@ -316,6 +331,8 @@ class SurfaceReader {
         surface_.faces.texture.push_back(texture_number(row_.values[static_cast<std::size_t>(texnumber)]));
       surface_.faces.begin.push_back(surface_.faces.index.size());
     }
+    if (colours.is_float() && surface_.faces.colours.size() > before)
+      ColourColumns::to_linear(std::span(surface_.faces.colours).subspan(before));
   }
 
   static std::int32_t texture_number(double value) {
@@ -334,23 +351,25 @@ class SurfaceReader {
   // VCG's exporter has a bug: where it writes a colour per corner it declares a colour per face. Such a
   // line ends in `9 r g b r g b r g b`, so the declared columns hold the wrong numbers and the tail
   // holds the colours.
-  bool add_vcg_corner_colours(std::size_t declared, std::size_t corners) {
+  bool add_vcg_corner_colours(const ColourColumns& columns, std::size_t corners) {
+    const std::size_t declared = row_.values.size() - static_cast<std::size_t>(columns.column[0]);
     if (row_.extra.empty()) return false;
     std::vector<double> tail(row_.values.end() - static_cast<std::ptrdiff_t>(declared), row_.values.end());
     tail.insert(tail.end(), row_.extra.begin(), row_.extra.end());
     const double n = 3.0 * static_cast<double>(corners);
     if (tail.front() != n || static_cast<double>(tail.size()) != n + 1) return false;
+    const auto value = [&](std::size_t i) {
+      return columns.is_float() ? static_cast<float>(tail[i]) : linear_from_srgb(tail[i]);
+    };
     for (std::size_t k = 0; k < corners; ++k)
-      surface_.faces.colours.push_back({linear_from_srgb(tail[3 * k + 1]), linear_from_srgb(tail[3 * k + 2]),
-                                        linear_from_srgb(tail[3 * k + 3]), 1});
+      surface_.faces.colours.push_back({value(3 * k + 1), value(3 * k + 2), value(3 * k + 3), 1});
     return true;
   }
 
   void add_face_colours(const ColourColumns& columns, std::size_t corners) {
     if (!columns.any()) return;
     surface_.faces.colours.resize(surface_.faces.begin.back(), {1, 1, 1, 1});
-    const auto red = static_cast<std::size_t>(columns.column[0]);
-    if (add_vcg_corner_colours(row_.values.size() - red, corners)) return;
+    if (add_vcg_corner_colours(columns, corners)) return;
     // Numbers too many of any other kind: which of them is the colour cannot be told.
     const Vec4f colour = row_.extra.empty() ? columns.read(row_) : Vec4f{1, 1, 1, 1};
     surface_.faces.colours.insert(surface_.faces.colours.end(), corners, colour);
@@ -406,6 +425,7 @@ class PlyModel {
 
   Model build(Lost& lost) {
     add_materials();
+    check_texture_numbers();
     build_mesh();
     tiled_.split(model_, resolver_, file_, options_);
     add_notes(lost);
@@ -439,8 +459,10 @@ class PlyModel {
     if (model_.materials.size() == 1) add_artec_materials(plain);
     if (model_.materials.size() == 1 && has_uv() && !has_colours()) add_material_of_stem(plain);
     if (model_.materials.size() > 1 && !has_uv())
-      add_warning(model_.notes, "texture-without-uv", "header",
-                  "a TextureFile is named but there are no texture coordinates");
+      add_warning(
+          model_.notes, "texture-without-uv", "header",
+          "a TextureFile is named but there are no texture coordinates (s t, u v or texture_u texture_v of "
+          "vertices, texcoord of faces)");
   }
 
   void add_material_of_stem(Material material) {
@@ -486,8 +508,27 @@ class PlyModel {
     if (face < surface_.faces.has_uv.size() && !surface_.faces.has_uv[face] && surface_.vertices.uv.empty())
       return 0;
     const std::int32_t texture = face < surface_.faces.texture.size() ? surface_.faces.texture[face] : 0;
-    const auto materials = static_cast<std::int32_t>(model_.materials.size());
-    return texture < 0 || texture + 1 >= materials ? 0 : static_cast<std::uint16_t>(texture + 1);
+    return texture < 0 || is_beyond(texture) ? 0 : static_cast<std::uint16_t>(texture + 1);
+  }
+
+  /// Some count from 1.
+  void check_texture_numbers() {
+    std::vector<std::int32_t>& numbers = surface_.faces.texture;
+    const auto beyond = std::ranges::count_if(numbers, [this](std::int32_t t) { return is_beyond(t); });
+    const std::size_t textures = model_.materials.size() - 1;
+    if (beyond == 0 || textures == 0) return;
+    const std::set<std::int32_t> all(numbers.begin(), numbers.end());
+    const bool is_only = textures == 1 && all.size() == 1;
+    if (is_only) std::ranges::fill(numbers, 0);
+    add_warning(model_.notes, "odd-texture-number", "element face",
+                "texture numbers of " + std::to_string(beyond) + " faces are beyond the last of the " +
+                    std::to_string(textures) + " textures, which count from 0; " +
+                    (is_only ? "the only texture is taken" : "these faces stay untextured"));
+  }
+
+  /// No comment names the texture of this number.
+  bool is_beyond(std::int32_t texture) const {
+    return texture + 1 >= static_cast<std::int32_t>(model_.materials.size());
   }
 
   bool textured(std::uint16_t material) const {

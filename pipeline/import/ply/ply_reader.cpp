@@ -157,7 +157,7 @@ std::size_t ply_type_bytes(PlyType type) {
 int PlyElement::find_property(std::initializer_list<std::string_view> names) const {
   for (std::string_view wanted : names)
     for (std::size_t i = 0; i < properties.size(); ++i)
-      if (properties[i].name == wanted) return static_cast<int>(i);
+      if (same_word(properties[i].name, wanted)) return static_cast<int>(i);
   return -1;
 }
 

@@ -44,7 +44,7 @@ TEST(FindModels, AFolderThatCannotBeListedIsAnError) {
   fs::create_directories(folder / "closed");
   write_text(folder / "a.glb", "x");
   ::chmod((folder / "closed").c_str(), 0);
-  EXPECT_THROW(list_models(folder.path().string()), RightsError);
+  EXPECT_THROW(list_models(folder.path().string()), PermissionError);
   ::chmod((folder / "closed").c_str(), 0700);
 }
 

@@ -113,6 +113,26 @@ TEST(AddImage, NotesSayWhatBecomesOfColoursAndOrientation) {
   EXPECT_FALSE(m.images[1].honour_profile);
 }
 
+TEST(AddImage, AColourProfileThatCannotBeUsedIsIgnoredAsBrowsersDo) {
+  const auto jpeg = testing::jpeg_bytes(8, 8, 3);
+  std::vector<std::uint8_t> odd{0xff, 0xd8, 0xff, 0xe2, 0, 20};
+  for (const char c : std::string("ICC_PROFILE\0\1\1none", 18)) odd.push_back(static_cast<std::uint8_t>(c));
+  odd.insert(odd.end(), jpeg.begin() + 2, jpeg.end());
+  testing::MemoryResolver resolver;
+  resolver.files["odd.jpg"] = odd;
+  Model m;
+  add_image(m, {"odd.jpg", "", false}, resolver, "f", "p", {});
+  ASSERT_EQ(m.images.size(), 1u);
+  EXPECT_FALSE(m.images[0].honour_profile);
+  EXPECT_EQ(decode_image(m.images[0], FloatEncoding::kSrgb).data,
+            decode_image(probe_image("plain", jpeg, {}), FloatEncoding::kSrgb).data);
+  EXPECT_EQ(count_notes(m, "colour-profile-ignored"), 1);
+  Model strict;
+  add_image(strict, {"odd.jpg", "", false}, resolver, "f", "p", {.colour_profiles = ProfilePolicy::kHonour});
+  EXPECT_THROW(decode_image(strict.images[0], FloatEncoding::kSrgb), InputError)
+      << "where the user asks for it";
+}
+
 TEST(AddImage, NotesSayThatTheFirstOfMorePicturesIsRead) {
   testing::MemoryResolver resolver;
   const auto png = testing::png_bytes(8, 8, 3);

@@ -317,6 +317,13 @@ TEST(ForeignFile, IsNamedWhateverItsNameSays) {
       {"\x1f\x8b\x08", "gzip archive"},
       {"Kaydara FBX Binary  ", "FBX"},
       {"LASF1234", "point cloud"},
+      {"<svg width=\"8\">", "SVG"},
+      {"8BPS12345678", "Photoshop"},
+      {std::string("\0\0\0\x18"
+                   "ftypheic",
+                   12),
+       "HEIC"},
+      {"b3dm12345678", "b3dmToGlb"},
       {"<?xml version=\"1.0\"?>", "XML"}};
   for (const auto& [content, what] : kinds) {
     for (const std::string name : {"m.glb", "m.gltf", "m.obj", "m.ply", "m.stl", "m.json", "m"})

@@ -111,6 +111,15 @@ TEST(Temporaries, AreRemovedWhenTheirWriterIsGoneWhateverLocksSay) {
   EXPECT_FALSE(fs::exists(old));
 }
 
+TEST(Temporaries, TheLongestNamesAreWritten) {
+  const TemporaryFolder folder;
+  const std::string name = std::string(NAME_MAX - 8, 'x') + ".texmesh", file = folder / name;
+  write_file_atomically(file, bytes_of("all"));
+  EXPECT_EQ(testing::read_text(file), "all");
+  EXPECT_EQ(testing::files_beneath(folder.path().string()), std::vector<std::string>{name});
+  EXPECT_NE(temporary_name(file, 1).find(".texmesh.tmp-"), std::string::npos) << "remove_stale_temporaries()";
+}
+
 TEST(Temporaries, ANameThatSomebodyHasIsLeftToThem) {
   const TemporaryFolder folder;
   const std::string file = folder / "a", temporary = temporary_name(file, 0);

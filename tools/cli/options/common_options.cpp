@@ -12,9 +12,21 @@
 
 namespace texmesh {
 
+namespace {
+
+/// What was printed must have arrived, or scripts take a part for the whole.
+int with_all_printed(int exit_code) {
+  std::cout.flush();
+  if (std::cout) return exit_code;
+  std::cerr << "texmesh: standard output cannot be written (is the disk full?)\n";
+  return exit_code == kExitOk ? kExitModelFailed : exit_code;
+}
+
+}  // namespace
+
 int run_and_print_errors(const std::function<int()>& run) {
   try {
-    return run();
+    return with_all_printed(run());
   } catch (const UsageError& e) {
     std::cerr << "texmesh: " << e.what() << '\n';
     return kExitUsage;

@@ -16,7 +16,7 @@ template <class Run>
 auto as_usage(const Run& run) {
   try {
     return run();
-  } catch (const RightsError&) {
+  } catch (const PermissionError&) {
     throw;
   } catch (const InputError& e) {
     throw UsageError(e.file(), e.place(), e.expected(), e.found());

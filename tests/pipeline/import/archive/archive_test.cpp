@@ -72,10 +72,32 @@ TEST(Archive, FilesOfOtherFoldersAndNamesOfWindowsAreFound) {
       const ImportedModel m = import_zip({{"source" + slash + "a.obj", kObj, deflated},
                                           {"source" + slash + "m.mtl", "newmtl m\nmap_Kd C.png\n", deflated},
                                           {"textures" + slash + "C.png", picture(), deflated},
-                                          {"__MACOSX/source/._a.obj", "x"}});
+                                          {"__MACOSX/source/._a.obj", "x"},
+                                          {"source" + slash + "._a.obj", "x"},
+                                          {"scan" + slash + "__MACOSX" + slash + "b.gltf", "x"}});
       EXPECT_EQ(m.model.images.size(), 1u);
       EXPECT_EQ(m.format, "obj");
     }
+}
+
+TEST(Archive, OfTwoPicturesOfOneNameNeitherIsTakenAndBothAreTold) {
+  const ZipFile model{"s/a.obj", kObj}, b{"b/C.png", picture()}, c{"c/C.png", picture()};
+  const auto of = [&](const std::string& written) {
+    return import_zip({model, {"s/m.mtl", "newmtl m\nmap_Kd " + written + "\n"}, b, c}).model;
+  };
+  const Model unknown = of("C.png");
+  EXPECT_TRUE(unknown.images.empty());
+  const auto told = std::ranges::find(unknown.notes, "missing-texture", &Note::code);
+  ASSERT_NE(told, unknown.notes.end());
+  EXPECT_TRUE(has(told->text, R"(any of these may be meant: "b/C.png", "c/C.png")")) << told->text;
+  EXPECT_EQ(of("b/C.png").images.size(), 1u) << "a whole name of the archive";
+}
+
+TEST(Archive, WhatAnArchiveHasInThePlaceOfAModelIsTold) {
+  EXPECT_TRUE(has(refusal_of({{"a.fbx", "x"}, {"b.png", "x"}, {"c", "x"}, {"d", "x"}}),
+                  "found a.fbx, b.png, c and 1 more alone"));
+  EXPECT_TRUE(has(refusal_of({{"textures/a.png", "x"}, {"source/a.zip", "x"}}),
+                  "found source/a.zip, an archive in the archive: unpack the outer one"));
 }
 
 TEST(Archive, OpenDroneMapsModelIsTheGeoreferencedOneInMetresWithZUp) {

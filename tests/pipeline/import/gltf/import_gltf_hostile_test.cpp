@@ -121,7 +121,6 @@ TEST(HostileGltf, RefusesAccessorsBeyondTheirBytes) {
   for (const std::uint64_t n : {std::uint64_t{1} << 20, std::uint64_t{9007199254740991}}) {
     expect_refused("/bufferViews/0", [&](json& j) { j["bufferViews"][0]["byteLength"] = n; });
     expect_refused("/bufferViews/0", [&](json& j) { j["bufferViews"][0]["byteOffset"] = n; });
-    expect_refused("/buffers/0/byteLength", [&](json& j) { j["buffers"][0]["byteLength"] = n; });
   }
   expect_refused("/accessors/0", [](json& j) { j["bufferViews"][0]["byteLength"] = 47; });
   for (const json& stride : {json(2), json(6), json(256), json(-4), json("12")}) {

@@ -402,6 +402,30 @@ TEST(ImportGltf, SoftFaultsAreWarnings) {
   Bytes longer = quad().glb();
   longer.resize(longer.size() + 4);
   EXPECT_TRUE(has_note(import(longer), "trailing-bytes", Severity::kWarning));
+
+  GltfBuilder required = quad();
+  required.json["extensionsRequired"] = {"KHR_lights_punctual", "CESIUM_RTC", "KHR_materials_odd"};
+  EXPECT_TRUE(has_note(import(required), "required-extension", Severity::kWarning))
+      << "what leaves the surface as it is";
+}
+
+TEST(ImportGltf, ABufferMayBeShorterThanItSaysWhereNothingOfItIsMissing) {
+  GltfBuilder b = quad();
+  b.json["buffers"][0]["byteLength"] = b.bin.size() + 100;
+  MemoryResolver resolver;
+  b.json["buffers"][0]["uri"] = "b.bin";
+  resolver.files["b.bin"] = b.bin;
+  const std::string text = b.json.dump();
+  const Model m = import_gltf("a.gltf", testing::bytes_of(text), resolver, {}, {}).model;
+  EXPECT_EQ(m.mesh.triangles.size(), 2u);
+  EXPECT_TRUE(has_note(m, "short-buffer", Severity::kWarning));
+  resolver.files["b.bin"].resize(b.bin.size() - 4);
+  try {
+    import_gltf("a.gltf", testing::bytes_of(text), resolver, {}, {});
+    ADD_FAILURE() << "a file that is cut off";
+  } catch (const InputError& e) {
+    EXPECT_NE(e.expected().find("a file that is cut off has fewer"), std::string::npos) << e.what();
+  }
 }
 
 TEST(ImportGltf, SaysWhatItLeavesOut) {

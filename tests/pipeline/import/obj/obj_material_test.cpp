@@ -50,6 +50,48 @@ TEST(ObjMaterial, CommentsBehindNamesOfMaterials) {
   }
 }
 
+TEST(ObjMaterial, AMaterialThatIsThereTwiceIsOne) {
+  MemoryResolver resolver;
+  resolver.files["a.mtl"] =
+      bytes_of("newmtl m\nmap_Kd c.png\nKd 0 1 0\nnewmtl n\nKd 0 0 1\nnewmtl m\nKd 1 0 0\nnewmtl m\n");
+  const Model once = import_text(kTextured, resolver);
+  EXPECT_EQ(once.materials[0].base_colour.x, 1);
+  EXPECT_EQ(once.materials[0].base_colour.y, 0);
+  EXPECT_EQ(count_notes(once, "missing-texture"), 1) << "the map of the first one";
+  EXPECT_EQ(count_notes(once, "repeated-material"), 1);
+}
+
+TEST(ObjMaterial, ALibrarysOnlyMaterialIsMeantWhereNoFaceNamesOne) {
+  const auto red = [](const std::string& mtl, const std::string& use) {
+    MemoryResolver resolver;
+    resolver.files["a.mtl"] = bytes_of(mtl);
+    const Model m = import_text("mtllib a.mtl\n" + kVertices + use, resolver);
+    const bool is_red = m.materials[m.mesh.triangle_material[0]].base_colour.y == 0;
+    EXPECT_EQ(count_notes(m, "other-material"), is_red ? 1 : 0) << use;
+    EXPECT_EQ(count_notes(m, "missing-material"), is_red ? 0 : 1) << use;
+    return is_red;
+  };
+  const std::string one = "newmtl Skin\nKd 1 0 0\n", faces = "f 1 2 3\nf 1 3 4\n";
+  for (const std::string use : {"", "usemtl\n", "usemtl (null)\n", "usemtl skin\n", "usemtl ns:Skin\n"})
+    EXPECT_TRUE(red(one, use + faces)) << use;
+  EXPECT_FALSE(red(one + "newmtl b\n", faces)) << "several";
+  EXPECT_FALSE(red(one, "f 1 2 3\nusemtl Skin\nf 1 3 4\n")) << "the other faces have it";
+  MemoryResolver half;
+  half.files["a.mtl"] = bytes_of(one);
+  EXPECT_EQ(count_notes(import_text("mtllib a.mtl gone.mtl\n" + kVertices + faces, half), "other-material"),
+            0)
+      << "it may be in the library that is missing";
+}
+
+TEST(ObjMaterial, AMessageNamesTheMaterialsThatAreThere) {
+  MemoryResolver resolver;
+  resolver.files["a.mtl"] = bytes_of("newmtl p\nnewmtl q\nnewmtl r\nnewmtl s\n");
+  const Model m = import_text(kTextured, resolver);
+  ASSERT_EQ(count_notes(m, "missing-material"), 1);
+  EXPECT_NE(m.notes.back().text.find("there are \"p\", \"q\", \"r\" and 1 more"), std::string::npos)
+      << m.notes.back().text;
+}
+
 TEST(ObjMaterial, TextureNamesWithBlanksOptionsAndTrailingBlanks) {
   for (const char* line : {"map_Kd a b.png", "map_Kd   a b.png \t", "map_Kd -s 1 1 1 -o 0 0 0 a b.png",
                            "map_Kd -clamp on a b.png", "map_Kd -blendu on -mm 0 1 -texres 512 a b.png\r",

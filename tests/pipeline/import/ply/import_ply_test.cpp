@@ -154,6 +154,11 @@ TEST(ImportPly, ColoursBecomeLinear) {
                               faces + "0 0 0 1 0 0.5\n1 0 0 nan 7 -1\n0 1 0 0 0 0\n3 0 1 2\n");
   EXPECT_NEAR(floats.mesh.colours[0].z, 0.21404, 1e-4);
   EXPECT_EQ(floats.mesh.colours[1], (Vec4f{1, 1, 0, 1})) << "clamped; NaN gives no tint";
+  const Model wide = import(head + "property float Red\nproperty float Green\nproperty float Blue\n" + faces +
+                            "0 0 0 255 0 128\n1 0 0 0 0 0\n0 1 0 0 0 0\n3 0 1 2\n");
+  ASSERT_EQ(wide.mesh.colours.size(), 3u) << "names in any case";
+  EXPECT_EQ(wide.mesh.colours[0].x, 1);
+  EXPECT_NEAR(wide.mesh.colours[0].z, 0.21586, 1e-4) << "0..255, as in OBJ";
 }
 
 TEST(ImportPly, FaceColoursAreKeptPerCorner) {
@@ -211,6 +216,27 @@ TEST(ImportPly, SeveralTexturesAndMissingOnes) {
       "my scan.png");
   EXPECT_EQ(count_notes(m, "missing-texture"), 1);
   EXPECT_FALSE(m.materials[m.mesh.triangle_material[2]].base_colour_texture.used());
+}
+
+TEST(ImportPly, TextureNumbersBeyondTheLastAreTold) {
+  const auto textured = [](const std::string& first, const std::string& second, const std::string& more) {
+    MemoryResolver resolver = with_texture();
+    const Model m = import(
+        bytes_of("ply\nformat ascii 1.0\ncomment TextureFile t.png\n" + more +
+                 "element vertex 3\nproperty float x\nproperty float y\nproperty float z\nelement face 2\n"
+                 "property list uchar int vertex_indices\nproperty list uchar float texcoord\n"
+                 "property int texnumber\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2 6 0 0 1 0 1 1 " +
+                 first + "\n3 2 1 0 6 0 0 1 0 1 1 " + second + "\n"),
+        resolver);
+    EXPECT_EQ(count_notes(m, "odd-texture-number"), 1);
+    std::size_t count = 0;
+    for (const std::uint16_t material : m.mesh.triangle_material)
+      count += m.materials[material].base_colour_texture.used();
+    return count;
+  };
+  EXPECT_EQ(textured("1", "1", ""), 2u) << "counted from 1";
+  EXPECT_EQ(textured("1", "2", ""), 0u) << "two textures, of which one is named";
+  EXPECT_EQ(textured("0", "2", "comment TextureFile my scan.png\n"), 1u);
 }
 
 TEST(ImportPly, PolygonsAndStrips) {

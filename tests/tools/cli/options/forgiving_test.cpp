@@ -36,6 +36,9 @@ TEST(Forgiving, AWordThatMeansNothingIsNamedWithOneThatDoes) {
   expect_told({"export", "a", "-o", "b", "--to", "modelviewer"}, 2, "; did you mean model-viewer?");
   expect_told({"compile", "a.obj"}, 2, "texmesh compile: --output is required (texmesh compile --help");
   expect_told({"extract", "a", "-o", "b.glb", "--bytes", ""}, 2, "--bytes: expected a value");
+  expect_told({"compile", "", "-o", "b"}, 2, "INPUT: expected a value, found an empty text");
+  expect_told({"compile", "a.obj", "", "-o", "b"}, 2, "INPUT: expected a value, found an empty text");
+  expect_told({"list", "", "-o", "b"}, 2, "INPUT: expected a value, found an empty text");
   expect_told({"help", "dump"}, 0, "Usage: texmesh dump");
   expect_told({"version"}, 0, "package format");
   expect_told({"compile", "a.obj", "-o", "b", "--rungs", "10,120"}, 2,

@@ -6,7 +6,9 @@
 #include <stdexcept>
 #include <string>
 
+#include "pipeline/io/atomic_file.h"
 #include "pipeline/io/exit_codes.h"
+#include "tests/support/command.h"
 #include "tools/cli/options/units.h"
 
 namespace texmesh::told_errors_test {
@@ -28,6 +30,17 @@ TEST(ToldErrors, WhatIsGivenIsTheExitCode) {
   EXPECT_EQ(t.text, "");
 }
 
+TEST(ToldErrors, WhatCannotBePrintedIsAnError) {
+  if (!std::filesystem::exists("/dev/full")) GTEST_SKIP() << "no /dev/full";
+  const auto printed_to = [](const std::string& where) {
+    return testing::run_command({"/bin/sh", "-c", TEXMESH_BINARY " --version " + where});
+  };
+  EXPECT_EQ(printed_to("> /dev/full").exit_code, kExitModelFailed);
+  EXPECT_NE(printed_to("> /dev/full").errors.find("standard output cannot be written"), std::string::npos);
+  EXPECT_EQ(printed_to(">&-").exit_code, kExitOk) << "nobody wants it";
+  EXPECT_EQ(printed_to("> /dev/null").exit_code, kExitOk);
+}
+
 TEST(ToldErrors, EachKindHasItsCodeAndSaysWhatItFound) {
   const Told usage = told_of([]() -> int { throw UsageError("--time", "", "seconds", "much"); });
   EXPECT_EQ(usage.exit_code, kExitUsage);
@@ -45,10 +58,12 @@ TEST(ToldErrors, EachKindHasItsCodeAndSaysWhatItFound) {
 
 TEST(ToldErrors, MissingRightsAreNoUsageError) {
   const auto asked = [](const auto& error) { return [&error]() -> int { throw error; }; };
-  const RightsError rights("scans", "", "", "cannot be listed");
+  const PermissionError rights("scans", "", "", "cannot be listed");
   const InputError name("scans", "", "", "cannot be listed");
   EXPECT_EQ(told_of([&] { return as_usage(asked(rights)); }).exit_code, kExitModelFailed);
   EXPECT_EQ(told_of([&] { return as_usage(asked(name)); }).exit_code, kExitUsage);
+  const auto no_folder = [] { return check_output_file("/nothing/there/x"), 0; };
+  EXPECT_EQ(told_of([&] { return as_usage(no_folder); }).exit_code, kExitUsage);
 }
 
 }  // namespace texmesh::told_errors_test

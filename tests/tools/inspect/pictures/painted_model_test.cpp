@@ -12,6 +12,7 @@
 #include "tests/support/command.h"
 #include "tests/support/meshes.h"
 #include "tests/support/packages.h"
+#include "tests/support/zip_writer.h"
 #include "tests/tools/inspect/pictures/painted_pictures.h"
 #include "tools/inspect/package_mesh.h"
 #include "tools/inspect/pictures/painted_model.h"
@@ -157,6 +158,9 @@ TEST(PaintedModel, APackageShowsItsFragmentsAndNamesTheAlternative) {
   EXPECT_TRUE(is_package(folder / "p.texmesh"));
   EXPECT_FALSE(is_package(TEXMESH_SOURCE_DIR "/README.md"));
   EXPECT_FALSE(is_package(folder / "absent"));
+  const Bytes model = testing::zip_of({{"a.obj", "v 0 0 0\n"}});
+  testing::write_text(folder / "a.zip", {model.begin(), model.end()});
+  EXPECT_FALSE(is_package(folder / "a.zip")) << "another ZIP archive may hold a model";
   const std::span<const PaintedQuantity> all = painted_quantities();
   ASSERT_EQ(all[1].name, "fragments");
   const PaintedModel view = paint_package(folder / "p.texmesh", all[1], kOneThread);
