@@ -5,7 +5,7 @@ import {startLink} from './link.mjs';
 import {countStorage} from './gpu-storage.mjs';
 
 const kNames = ['maps', 'large', 'kept', 'progressive'];
-const kElement = {'/packages/': packages, '/viewer/': path.join(env.work, 'work/delivery/web/dist/viewer')};
+export const kElement = {'/packages/': packages, '/viewer/': path.join(env.work, 'work/delivery/web/dist/viewer')};
 /** A page with `elements`, by one script tag. */
 export const html = (elements, style = '') => `<!doctype html><html lang="en"><title>page</title><link rel="icon" href="data:,">
 <style>body{margin:0;font:14px sans-serif}.grid{display:grid;grid-template-columns:repeat(5,1fr);gap:4px}texmesh-viewer{width:100%;height:200px}${style}</style>
@@ -14,11 +14,11 @@ export const elements = (count, attributes = '', names = kNames) =>
   Array.from({length: count}, (_, i) => `<texmesh-viewer src="/packages/${names[i % names.length]}.texmesh?${i}" alt="scan ${i}" ${attributes}></texmesh-viewer>`).join('');
 
 /** Serves the page and opens it in a context of its own; `body` gets the page and the server. */
-export async function onPage(text, body, {link: linkOptions, context: contextOptions = {}, before, fault} = {}) {
+export async function onPage(text, body, {link: linkOptions, context: contextOptions = {}, before, fault, policy} = {}) {
   const folder = fs.mkdtempSync(path.join(env.work, 'page-'));
   fs.writeFileSync(path.join(folder, 'index.html'), text);
   const b = await common();
-  const server = await serve({...kElement, '/': folder}, {fault});
+  const server = await serve({...kElement, '/': folder}, {fault, policy});
   const link = linkOptions && await startLink({target: server.port, ...linkOptions});
   const context = await b.browser.newContext({viewport: {width: 1280, height: 900}, ...contextOptions});
   const page = await context.newPage();

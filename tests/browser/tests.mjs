@@ -11,6 +11,7 @@ import {starvation} from './starved.mjs';
 import './block-tests.mjs';
 import './display-tests.mjs';
 import './element-tests.mjs';
+import './hosts-tests.mjs';
 import './limits-tests.mjs';
 import './materials-tests.mjs';
 import './memory-tests.mjs';

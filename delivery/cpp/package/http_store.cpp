@@ -73,10 +73,7 @@ class HttpSource final : public ByteSource {
   HttpSource(std::vector<std::string> urls, std::shared_ptr<HttpPool> pool, HttpAnswer first)
       : urls_(std::move(urls)), pool_(std::move(pool)) {
     check_range(first, 0, kStartBytes);
-    const std::uint64_t bytes = std::min(kStartBytes, *total_);
-    if (first.complete && first.body.size() != bytes)
-      throw FormatError(name(), "byte 0", std::to_string(bytes) + " bytes",
-                        std::to_string(first.body.size()) + ", " + describe_answer(first));
+    require_whole(first, 0);
     store(0, std::move(first.body));
   }
   std::string name() const override { return shown_url(urls_.front()); }
@@ -207,9 +204,12 @@ class HttpSource final : public ByteSource {
       p.got.insert(p.got.end(), a.body.begin(), a.body.end());
       if (a.body.size() >= kProgressBytes) p.retries.emplace(pool_->options());
       if (p.got.size() == p.bytes) return true;
-      if (a.complete)
+      if (a.complete) {
+        require_whole(a, at);
+        if (a.body.size() >= kProgressBytes) return false;  // some servers send no more at once
         throw FormatError(name(), place, std::to_string(p.bytes) + " bytes",
                           std::to_string(p.got.size()) + ", " + describe_answer(a));
+      }
     }
     if (a.too_long && a.status == 206)
       throw FormatError(name(), place, std::to_string(p.bytes) + " bytes", "more");
@@ -231,6 +231,15 @@ class HttpSource final : public ByteSource {
     throw FormatError(name(), "", "the file that reading began with",
                       found + ": it was replaced, read it anew");
   }
+  /// Throws where the body has not the length that its Content-Range says, as a compressed one.
+  void require_whole(const HttpAnswer& a, std::uint64_t at) const {
+    const std::uint64_t bytes = *a.last - *a.first + 1;
+    if (a.complete && a.body.size() != bytes)
+      throw FormatError(name(), "byte " + std::to_string(at), std::to_string(bytes) + " bytes",
+                        std::to_string(a.body.size()) + ", " + describe_answer(a));
+  }
+  /// Throws where an answer is of another file, or of another place of it. It may be shorter than was asked
+  /// for.
   void check_range(const HttpAnswer& a, std::uint64_t offset, std::uint64_t bytes) {
     const std::string place = "byte " + std::to_string(offset);
     require_file(a, offset == 0 ? ByteSpan(a.body) : ByteSpan(), name());
@@ -239,7 +248,7 @@ class HttpSource final : public ByteSource {
     const std::uint64_t total = a.total ? *a.total : *total_;  // the first answer has it
     if (total_ && total != *total_) fail_replaced(std::to_string(total) + " bytes");
     if (total_ && !is_same_file(a, etag_, *total_)) fail_replaced("ETag " + a.etag);
-    if (*a.first != offset || *a.last != std::min(offset + bytes, total) - 1)
+    if (*a.first != offset || *a.last >= std::min(offset + bytes, total))
       throw FormatError(name(), place, "the range that was asked for",
                         std::to_string(*a.first) + "-" + std::to_string(*a.last));
     total_ = total;

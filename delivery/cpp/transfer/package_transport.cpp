@@ -7,8 +7,9 @@
 namespace texmesh {
 namespace {
 
-constexpr std::uint32_t kMaxParts = 256;  // of a request; more would not fit the pool's numbers
-constexpr double kBusyWait_s = 0.1;       // of a server that has too much to do, if it names no time
+constexpr std::uint32_t kMaxParts = 256;    // of a request; more would not fit the pool's numbers
+constexpr std::uint64_t kLeastPart = 1024;  // a server may send less than was asked for, but no fewer bytes
+constexpr double kBusyWait_s = 0.1;         // of a server that has too much to do, if it names no time
 
 double seconds_on(std::optional<std::chrono::steady_clock::time_point>& start) {
   const auto now = std::chrono::steady_clock::now();
@@ -101,6 +102,10 @@ class HttpTransport final : public Transport {
       if (it == open_.end()) continue;
       Outcome outcome{number, now_s(), true, {}, {}, 0, false};
       if (!store_part(it->second, part, std::move(ended->answer), outcome)) {
+        if (outcome.problem.empty()) {
+          ask(number, part, it->second);
+          continue;
+        }
         outcome.good = false;
         stop(number);
         return outcome;
@@ -157,13 +162,13 @@ class HttpTransport final : public Transport {
     pool_.start(number_of(request, part), mirror.tree ? mirror.url + p.entry.path : mirror.url,
                 whole ? std::nullopt : std::optional(range), range.bytes);
   }
-  /// Whether the part is complete now; otherwise the outcome says why not.
+  /// Whether the part is complete now; otherwise the outcome says why not, or nothing where the server has
+  /// sent less than was asked for, and the rest is to be asked for.
   bool store_part(Open& open, std::size_t part, HttpAnswer a, Outcome& outcome) {
     const HttpRange asked = place_of(open, part);
     const PackagePart& p = open.wanted[part];
     Mirror& mirror = mirrors_[open.mirror];
-    if (a.status == 206 &&
-        (!a.first || *a.first != asked.first || *a.last != asked.first + asked.bytes - 1)) {
+    if (a.status == 206 && (!a.first || *a.first != asked.first || *a.last >= asked.first + asked.bytes)) {
       outcome.problem = "another range than was asked for";
       return false;
     }
@@ -176,6 +181,9 @@ class HttpTransport final : public Transport {
     if (a.status == 206 || (a.status == 200 && whole)) {
       open.parts[part].insert(open.parts[part].end(), a.body.begin(), a.body.end());
       if (a.complete && open.parts[part].size() == p.range.bytes) return true;
+      if (a.status == 206 && a.complete && a.body.size() >= kLeastPart &&
+          a.body.size() == *a.last - *a.first + 1)
+        return false;
       // A server without ranges cannot go on where it was cut.
       if (a.status == 200 || a.too_long) open.parts[part].clear();
       outcome.problem = a.too_long    ? "more bytes than were asked for"

@@ -124,6 +124,7 @@ export class TexmeshPage {
     this.workers_ = new SharedWorkers(options_.workers ?? Math.min(4, Math.max(2, cores - 1)),
       options_.workerUrl);
     this.visibility_ = new Visibility((canvas, resized) => this.placeChanged_(canvas, resized));
+    globalThis.addEventListener?.('online', this.online_);
   }
 
   /** Shows a package on a canvas, as soon as it is seen. It replaces the model that the canvas had. */
@@ -164,6 +165,7 @@ export class TexmeshPage {
   /** Removes all models and frees the graphics context and the workers. */
   dispose(): void {
     this.disposed_ = true;
+    globalThis.removeEventListener?.('online', this.online_);
     for (const model of this.models) model.remove();
     cancelAnimationFrame(this.frame_);
     this.visibility_.dispose();
@@ -171,6 +173,8 @@ export class TexmeshPage {
     this.painter_.dispose();
     this.events_.clear();
   }
+
+  private readonly online_ = (): void => this.models.forEach((m) => m.cameOnline());
 
   // ---- what models ask for
 

@@ -90,6 +90,18 @@ TEST(TextureLoader, FetchesEveryFragmentOnceAndTellsWhatItHolds) {
   for (const Request& q : server.requests()) EXPECT_TRUE(begins.insert(q.first).second) << q.first;
 }
 
+TEST(TextureLoader, AServerMaySendLessThanIsAskedFor) {
+  int cut = 0;
+  RawServer server([&](Request r) {
+    if (r.first > 0 && r.last > r.first + 1023 && ++cut > 0) r.last = r.first + 1023;
+    return Reply{ranged(package_bytes(), r)};
+  });
+  Client c({server.url("/a.texmesh")});
+  EXPECT_EQ(c.loader.load(full_size(c.package), c.options()).given_up, 0u);
+  EXPECT_EQ(c.shown.rung.size(), 2 * kPlanes);
+  EXPECT_GT(cut, 0);
+}
+
 TEST(TextureLoader, RefinesToTheTopWithinItsBytes) {
   RawServer server(good);
   Client c({server.url("/a.texmesh")});

@@ -225,6 +225,22 @@ TEST(HttpStore, ALengthThatTheServerDoesNotTellIsLegal) {
       << "later answers need not tell it again";
 }
 
+TEST(HttpStore, AServerMaySendLessThanWasAskedForButNoCrumbs) {
+  std::uint64_t most = 20000;
+  RawServer server([&](Request r) {
+    r.last = std::min(r.last, r.first + most - 1);
+    return Reply{ranged(package(), r)};
+  });
+  PackageReader reader(open_url(server.url("/a.texmesh"), quick()));
+  EXPECT_GT(read_all(reader), 0u);
+  EXPECT_GT(server.requests().size(), package().size() / 20000);
+  most = 10;
+  EXPECT_ANY_THROW({
+    PackageReader crumbs(open_url(server.url("/a.texmesh"), quick()));
+    read_all(crumbs);
+  });
+}
+
 TEST(HttpStore, LiesAboutRangesAreFound) {
   const auto refused = [](const std::function<std::string(const Request&)>& handler) {
     RawServer server([&](const Request& r) { return Reply{handler(r), true}; });

@@ -19,12 +19,18 @@ export function slowHostNote(form: string, compressed: boolean, url: string): st
 
 /** What most often causes an error, '' where nobody knows; `page`, `url`: addresses of page and package. */
 export function causeOf(error: unknown, url: string, page: string): string {
+  if (/decoder of meshes/.test(String(error)))
+    return "The page's Content-Security-Policy may forbid decoders: they need script-src " +
+      "'wasm-unsafe-eval', and blob: in worker-src, connect-src and img-src.";
   if (!(error instanceof TexmeshError)) return '';
   const { found, rule } = error, status = Number(/status (\d+)/.exec(found)?.[1] ?? 0);
   if (status >= 400) return `The server's answer for ${url}: status ${status}.`;
   if (/html/.test(found) || rule === 'K11')
     return 'What the server sent is no texmesh package. A host that answers unknown addresses with its ' +
       'start page does so where the address is wrong.';
+  if (/it was replaced/.test(found))
+    return 'The file changes from answer to answer. Several servers behind one address must send the same ' +
+      'ETag for a file, or none.';
   const { origin } = new URL(page);
   if (error instanceof InputError && status === 0)
     return new URL(url, page).origin === origin ? 'The server did not answer.'

@@ -8,7 +8,7 @@ import {
 } from './wording';
 
 /** Looks of the element; applications change them by parts, slots and the custom properties. */
-export const style = `
+const style = `
 :host { display: block; position: relative; width: 300px; height: 300px; contain: content;
   color-scheme: light dark; --texmesh-text: light-dark(#1c1c1c, #f2f2f2);
   --texmesh-panel: light-dark(rgb(255 255 255 / .88), rgb(24 24 24 / .88));
@@ -24,9 +24,10 @@ canvas:active { cursor: grabbing; }
 .poster img, ::slotted([slot=poster]) { width: 100%; height: 100%; object-fit: contain; }
 .poster.gone { opacity: 0; }
 .bar { position: absolute; left: 0; top: 0; height: 3px; min-width: 10%; background: var(--texmesh-accent); }
+.box, .note, .rights { unicode-bidi: plaintext; }
 .box { position: absolute; left: 0; right: 0; margin: 0 auto; top: 50%; transform: translateY(-50%);
   width: fit-content; max-width: 94%; max-height: 100%; overflow: auto; box-sizing: border-box;
-  padding: .6em 1em; border: 0; border-radius: .5em; font: inherit; text-align: center;
+  padding: .6em 1em; border: 1px solid transparent; border-radius: .5em; font: inherit; text-align: center;
   color: var(--texmesh-text); background: var(--texmesh-panel); overflow-wrap: anywhere; }
 .box small { display: block; }
 .box[hidden] { display: none; }
@@ -64,8 +65,7 @@ const noteMs = 8000;
 /** Percent by which the bar grows. */
 const barStep = 20;
 
-const template = `<style>${style}</style>
-<canvas part="canvas" role="img"></canvas>
+const template = `<canvas part="canvas" role="img"></canvas>
 <div class="poster" part="poster"><slot name="poster"></slot></div>
 <slot name="progress-bar"><div class="bar" part="progress" role="progressbar" aria-label="loading"
   aria-valuemin="0" aria-valuemax="100" hidden></div></slot>
@@ -76,6 +76,8 @@ const template = `<style>${style}</style>
 <p class="help" id="help">Drag or use the arrow keys to turn the object<span>, plus and minus to come nearer
   or go away</span>, Home to see it as at first.</p>
 <slot></slot>`;
+
+let sheet: CSSStyleSheet | undefined;
 
 /** <texmesh-viewer>; `host` is to be set before the element is defined. */
 export class TexmeshViewer extends HTMLElement {
@@ -96,6 +98,9 @@ export class TexmeshViewer extends HTMLElement {
 
   constructor() {
     super();
+    // A page whose policy forbids styles in its text (CSP) allows this one.
+    (sheet ??= new CSSStyleSheet()).replaceSync(style);
+    this.root_.adoptedStyleSheets = [sheet];
     this.root_.innerHTML = template;
     const part = (selector: string): HTMLElement => this.root_.querySelector(selector)!;
     this.parts_ = { canvas: part('canvas'), poster: part('.poster'), bar: part('.bar'),
@@ -179,7 +184,7 @@ export class TexmeshViewer extends HTMLElement {
     reveal.querySelector('small')!.textContent = offerInWords(startBytes, allBytes, linkBytesS());
   }
   private get words_(): typeof words.en {
-    return wordsFor(this.closest<HTMLElement>('[lang]')?.lang);
+    return wordsFor((this.closest<HTMLElement>('[lang]') ?? document.documentElement).lang);
   }
   private get waits_(): boolean {
     return !this.revealed_ && (this.getAttribute('reveal') === 'manual' || savesData());
@@ -212,7 +217,7 @@ export class TexmeshViewer extends HTMLElement {
   // ---- the model's course
 
   private follow_(model: PageModel): void {
-    const { bar, poster } = this.parts_;
+    const { bar, error, poster } = this.parts_;
     this.model_ = model;
     const tell = (name: string, detail: object = {}): void =>
       void this.dispatchEvent(new CustomEvent(name, { detail }));
@@ -237,7 +242,10 @@ export class TexmeshViewer extends HTMLElement {
       }
       tell('progress', { totalProgress });
     });
-    model.on('phase', ({ phase }) => (bar.hidden = phase !== 'opening' && phase !== 'turn'));
+    model.on('phase', ({ phase }) => {
+      bar.hidden = phase !== 'opening' && phase !== 'turn';
+      if (phase === 'opening') error.hidden = true;
+    });
     model.on('loaded', () => {
       const { form, client: { compressed } } = model.package!;
       if (form === 'whole' || compressed)
@@ -249,9 +257,13 @@ export class TexmeshViewer extends HTMLElement {
       ({ lost }) => this.note_(lost ? 'The graphics memory was taken away; waiting for it.' : ''));
     model.on('memory',
       () => this.note_('There is little graphics memory: a coarser picture is shown.', noteMs));
-    model.on('error', ({ fatal, error, message }) => {
+    let told = false;
+    model.on('error', ({ fatal, error: problem, message }) => {
       tell('error', { type: 'loadfailure', fatal, message });
-      if (fatal) this.fail_(error, true);
+      if (fatal) return this.fail_(problem, true);
+      if (model.lacking) this.note_(this.words_.rest, noteMs);
+      if (!told) console.info(`<texmesh-viewer src="${this.src}">: ${message}`);
+      told = true;
     });
     this.note_(this.hasPoster_ ? '' : this.words_.loading);
   }
@@ -265,14 +277,11 @@ export class TexmeshViewer extends HTMLElement {
     const said = this.words_, { src } = this;
     console.error(`<texmesh-viewer src="${src}">:`, problem);
     void this.tellOwner_(({ causeOf }) => causeOf(problem, src, document.baseURI));
-    const button =
-      Object.assign(document.createElement('button'), { textContent: said.again, hidden: !again });
-    button.onclick = () => {
-      error.hidden = true;
-      this.model_?.retry();
-    };
     // What fails before there is a model: the browser has no WebGL.
-    error.replaceChildren(said[again ? sentenceOf(problem) : 'no3d'], document.createElement('br'), button);
+    const what = again ? sentenceOf(problem) : 'no3d';
+    const button = Object.assign(document.createElement('button'),
+      { textContent: said.again, hidden: what === 'no3d', onclick: () => this.model_?.retry() });
+    error.replaceChildren(said[what], document.createElement('br'), button);
     error.hidden = false;
     bar.hidden = true;
     this.note_('');

@@ -86,6 +86,8 @@ export interface Words {
   unreadable: string;
   /** No answer, or not the one that was asked for. */
   unreachable: string;
+  /** A part did not come, and is asked for again later. */
+  rest: string;
   no3d: string;
 }
 export const words: Record<string, Words> = {
@@ -93,16 +95,19 @@ export const words: Record<string, Words> = {
     missing: 'This object is not here any more.',
     unreadable: 'This object cannot be shown.',
     unreachable: 'The object did not come. Please check the connection.',
+    rest: 'Some of it has not come yet.',
     no3d: 'This browser cannot show objects in 3D.' },
   de: { loading: 'Wird geladen …', show: 'In 3D ansehen', again: 'Noch einmal versuchen',
     missing: 'Dieses Objekt ist nicht mehr hier.',
     unreadable: 'Dieses Objekt lässt sich nicht zeigen.',
     unreachable: 'Das Objekt ist nicht angekommen. Bitte prüfen Sie die Verbindung.',
+    rest: 'Ein Teil ist noch nicht angekommen.',
     no3d: 'Dieser Browser kann keine Objekte in 3D zeigen, ein anderer oder neuerer vielleicht.' },
   fr: { loading: 'Chargement …', show: 'Voir en 3D', again: 'Réessayer',
     missing: "Cet objet n'est plus ici.",
     unreadable: 'Cet objet ne peut pas être affiché.',
     unreachable: "L'objet n'est pas arrivé. Veuillez vérifier la connexion.",
+    rest: "Une partie n'est pas encore arrivée.",
     no3d: 'Ce navigateur ne peut pas afficher des objets en 3D.' },
 };
 /** The words for a language such as "de-AT"; English where there are none. */
@@ -110,9 +115,9 @@ export const wordsFor = (language = ''): Words => words[language.toLowerCase().s
 
 /** The sentence that a visitor reads of an error. */
 export function sentenceOf(error: unknown): keyof Words {
-  if (!(error instanceof TexmeshError)) return 'unreadable';
+  if (!(error instanceof TexmeshError)) return /WebGL/.test(String(error)) ? 'no3d' : 'unreadable';
   const { found, rule } = error, status = Number(/status (\d+)/.exec(found)?.[1] ?? 0);
-  if (status >= 400 && status < 500) return 'missing';
+  if (/status 4(?!08|29)/.test(found)) return 'missing';
   const page = status < 300 && (rule === 'K11' || /html/.test(found));
   return error instanceof InputError && !page ? 'unreachable' : 'unreadable';
 }

@@ -17,6 +17,8 @@ export class HttpClient {
   received = 0;
   /** A server has compressed files that are compressed already. */
   compressed = false;
+  /** Requests that servers have not answered well, since the last one that they have. */
+  failedInRow = 0;
   /** Requests that have ended. */
   readonly records: RequestRecord[] = [];
   readonly listeners = new Set<(record: RequestRecord) => void>();
@@ -79,7 +81,8 @@ export class HttpClient {
       const length = status === 200 && /^\d{1,15}$/.test(header('content-length'))
         ? Number(header('content-length')) : -1;
       Object.assign(answer, { status, url: response.url || url, etag: etag[0] === '"' ? etag : '', length,
-        type: header('content-type'), range: contentRange(header('content-range')) });
+        type: header('content-type'), retryAfterS: Number(header('retry-after')),
+        range: contentRange(header('content-range')) });
       this.compressed ||= status < 300 && !/json|html/.test(answer.type) &&
         /\w/.test(header('content-encoding').replace('identity', ''));
       const reader = record.ok ? body?.getReader() : undefined;
@@ -127,6 +130,7 @@ export class HttpClient {
 
   private record_(record: RequestRecord): void {
     const { url, ok, firstByte, started, status } = record;
+    this.failedInRow = ok ? 0 : this.failedInRow + 1;
     if (ok && this.records.length > 0) {
       const wait = firstByte - started;
       this.rttS = Math.min(this.rttS || wait, wait);

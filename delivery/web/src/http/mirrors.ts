@@ -9,12 +9,17 @@ function mayRetry({ status, complete, tooLong }: Answer): boolean {
   return status === 0 || status === 408 || status === 429 || status >= 500;
 }
 
+/** After so many failures in a row nothing is asked for twice: the server is overloaded, or gone. */
+const mostInRow = 12;
+/** No server is waited for longer, seconds. */
+const longestDelayS = 10;
+
 /** A function that waits before the next try, ever longer; false: no further try helps. */
-export function retriesOf({ options }: HttpClient, signal?: AbortSignal): (a: Answer) => Promise<boolean> {
-  let [left, delayS] = [options.retries, options.retryDelayS];
+export function retriesOf(client: HttpClient, signal?: AbortSignal): (a: Answer) => Promise<boolean> {
+  let { retries: left, retryDelayS: delayS } = client.options;
   return async (a) => {
-    if (!mayRetry(a) || left-- <= 0) return false;
-    await sleepS(delayS, signal);
+    if (!mayRetry(a) || left-- <= 0 || client.failedInRow > mostInRow) return false;
+    await sleepS(Math.max(delayS, Math.min(a.retryAfterS || 0, longestDelayS)), signal);
     throwIfAborted(signal);
     delayS *= 2;
     return true;

@@ -7,6 +7,9 @@ import { Asking, Mirror, Mirrors, retriesOf } from './mirrors';
 import { Answer, isSameFile, shownUrl, whatCame } from './requests';
 import type { PackageForm, PackageStore, Place, ReadOptions } from './store';
 
+/** A server may answer less than was asked for, but no fewer bytes. */
+const leastPart = 1024;
+
 /** Whether the page's own origin answers at a URL: other origins may keep headers to themselves (CORS). */
 function sameOrigin(url: string): boolean {
   const here = globalThis.location;
@@ -122,7 +125,10 @@ export class RangeStore implements PackageStore {
         this.checkRange_(m, a, range);
         chunks.push(a.body);
         have += a.body.length;
-        if (a.complete) return concat(chunks);
+        if (a.complete) {
+          if (have === bytes || m.total <= offset + have) return concat(chunks); // -1: not known
+          if (a.body.length >= leastPart) continue; // some servers send no more at once
+        }
       }
       if ((asking.othersLeft && have === before) || !(await mayTryAgain(a)))
         throw new InputError(shownUrl(m.url), `byte ${range.offset}`, 'an answer with status 206',
@@ -152,7 +158,7 @@ export class RangeStore implements PackageStore {
     const total = range[2] < 0 ? m.total : range[2];
     this.requireSame_(m, m.total < 0 || total === m.total, offset, `${total} bytes`);
     this.require_(m,
-      first === offset && last === Math.min(offset + bytes, total < 0 ? last + 1 : total) - 1, offset,
+      first === offset && last < Math.min(offset + bytes, total < 0 ? last + 1 : total), offset,
       'the range that was asked for', `${first}-${last}`);
     m.total = total;
   }

@@ -70,6 +70,8 @@ export interface Answer {
   length: number;
   /** Content-Range, when that header may be read: first and last byte, bytes of the file (-1 = not said). */
   range?: number[];
+  /** Seconds after which the server wants to be asked again; NaN: a date. */
+  retryAfterS?: number;
   /** The body ended as it should. */
   complete: boolean;
   tooLong: boolean;

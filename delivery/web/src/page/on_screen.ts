@@ -16,6 +16,7 @@ export class Visibility {
   private readonly nearby_ = new Set<Element>();
   private readonly lookedAt_ = new Set<Element>(); // whether they are seen is known
   private readonly places_ = new Map<Element, PagePlace>();
+  private readonly ended_ = new AbortController();
 
   /** `changed` hears of a canvas that has come, gone, or has another size: `resized` then. */
   constructor(private readonly changed_: (canvas: Element, resized: boolean) => void) {
@@ -38,6 +39,14 @@ export class Visibility {
     }, { rootMargin: `${100 * nearShare}% 0%` });
     this.sized_ =
       new ResizeObserver((entries) => this.fit_(entries.map(({ target }) => target as HTMLCanvasElement)));
+    this.followRatio_();
+  }
+  /** Zooming, or another screen, changes the pixels of a canvas whose size stays. */
+  private followRatio_(): void {
+    globalThis.matchMedia?.(`(resolution: ${devicePixelRatio}dppx)`).addEventListener('change', () => {
+      this.fit_([...this.places_.keys()] as HTMLCanvasElement[]);
+      this.followRatio_();
+    }, { once: true, signal: this.ended_.signal });
   }
   /** Follows a canvas; its place is kept up to date. */
   follow(canvas: HTMLCanvasElement, place: PagePlace): void {
@@ -67,6 +76,7 @@ export class Visibility {
     return this.nearby_.has(canvas) && this.lookedAt_.has(canvas);
   }
   dispose(): void {
+    this.ended_.abort();
     for (const observer of [this.seen_, this.near_, this.sized_]) observer.disconnect();
     this.places_.clear();
     this.nearby_.clear();
@@ -85,6 +95,10 @@ export class Visibility {
       const [width, height] = sizes[i];
       const place = this.places_.get(canvas);
       if (!place) return;
+      if (!place.areaPx) { // the share that is seen stays as it was, of which alone the observer speaks
+        this.seen_.unobserve(canvas);
+        this.seen_.observe(canvas);
+      }
       place.areaPx = width * height;
       if (width < 1 || height < 1 || (canvas.width === width && canvas.height === height)) return;
       canvas.width = width;

@@ -1,7 +1,8 @@
 import { type Object3D, PerspectiveCamera, Scene } from 'three';
-import { isAbort } from '../format/errors';
+import { FormatError, InputError, isAbort } from '../format/errors';
 import { firstPicture } from '../format/manifest';
 import type { OpenOptions, PackageReader } from '../http/package_reader';
+import { isForGood } from '../http/requests';
 import type { LoadEvents, LoadOptions, LoadedModel, Turn } from '../scene/api';
 import { displayOf } from '../scene/camera';
 import { Emitter } from '../scene/events';
@@ -74,6 +75,11 @@ export interface Host {
   forget(model: PageModel): void;
 }
 
+/** What did not come is asked for again after so long, and twice as long each time; so often at most. */
+const askAgain = { firstS: 4, times: 6 };
+/** A package that was replaced while it came is opened anew so often. */
+const mostReplaced = 2;
+
 /** One package on one canvas of a page. */
 export class PageModel {
   readonly scene = new Scene();
@@ -89,6 +95,11 @@ export class PageModel {
   /** Resolves when the first picture is on the canvas; rejects when it fails or is removed before. */
   readonly firstPicture: Promise<void>;
   private readonly events_ = new Emitter<PageModelEvents>();
+  /** Something did not come, and is asked for again later. */
+  lacking = false;
+  private asked_ = 0; // how often it was asked for again
+  private later_?: ReturnType<typeof setTimeout>;
+  private replaced_ = 0;
   private unpainted_ = false; // the first picture waits for a frame
   private abort_ = new AbortController();
   private settle_!: { shown: () => void; failed: (error: unknown) => void };
@@ -127,11 +138,13 @@ export class PageModel {
   }
   /** After a failure: waits to be opened once more. */
   retry(): void {
-    if (this.phase !== 'failed') return;
-    this.end_();
-    this.package?.dispose();
-    this.package = undefined;
-    this.enter_('waiting');
+    if (this.phase === 'failed') this.reopen_();
+  }
+  /** The network is there again: what did not come is asked for. */
+  cameOnline(): void {
+    this.retry();
+    this.asked_ = 0;
+    if (this.lacking) this.askForRest_();
   }
   /** Takes the model from the page and frees all that it has. */
   remove(): void {
@@ -175,12 +188,20 @@ export class PageModel {
   /** Fetches what the display can show beyond the model's turn. */
   async refine(): Promise<void> {
     const { load } = this;
+    this.lacking = false;
     try {
       await load?.refine();
     } catch (error) {
       if (!isAbort(error)) this.say_(error, false);
     }
-    if (this.load === load) this.complete = true;
+    if (this.load !== load) return;
+    this.complete = true;
+    if (this.lacking) this.askLater_();
+    else this.asked_ = 0;
+  }
+  private askLater_(): void {
+    if (this.asked_ < askAgain.times)
+      this.later_ ??= setTimeout(() => this.askForRest_(), 1000 * askAgain.firstS * 2 ** this.asked_++);
   }
   /** Frees everything but the package's documents and the picture on the canvas. */
   release(): void {
@@ -225,7 +246,7 @@ export class PageModel {
       },
     });
     this.load = load;
-    this.complete = false;
+    this.complete = this.lacking = false;
     const redraw = (): void => host.redraw(this);
     for (const name of ['proxy', 'scale', 'plane', 'fragment', 'context'] as const) load.on(name, redraw);
     load.on('context', (event) => {
@@ -240,7 +261,15 @@ export class PageModel {
       host.changed(this);
     });
     load.on('progress', (event) => this.events_.emit('progress', event));
-    load.on('error', ({ fatal, error }) => !fatal && this.say_(error, false)); // a fatal one ends `done`, too
+    load.on('error', ({ fatal, error }) => {
+      if (fatal) return; // it ends `done`, too
+      if (wasReplaced(error)) return this.fail_(error);
+      if (error instanceof InputError && !isForGood(error)) {
+        this.lacking = true;
+        if (this.complete) this.askLater_(); // else refining does
+      }
+      this.say_(error, false);
+    });
     load.done.then(
       () => {
         if (this.load !== load) return;
@@ -267,11 +296,25 @@ export class PageModel {
   private fail_(error: unknown): void {
     if (this.phase === 'failed' || this.phase === 'removed') return;
     this.end_();
+    if (wasReplaced(error) && this.replaced_++ < mostReplaced) return this.reopen_();
     this.say_(error, true);
     this.settle_.failed(error);
     this.enter_('failed');
   }
+  private reopen_(): void {
+    this.package?.dispose();
+    this.package = undefined;
+    this.enter_('waiting');
+  }
+  private askForRest_(): void {
+    clearTimeout(this.later_);
+    this.later_ = undefined;
+    this.complete = false;
+    this.host_.changed(this);
+  }
   private end_(): void {
+    clearTimeout(this.later_);
+    this.later_ = undefined;
     this.abort_.abort();
     const { load } = this;
     this.load = undefined;
@@ -279,3 +322,7 @@ export class PageModel {
   }
 }
 
+/** Whether the file is no more the one that reading began with (SPEC.md, V11). */
+function wasReplaced(error: unknown): boolean {
+  return error instanceof FormatError && /it was replaced/.test(error.found);
+}

@@ -26,12 +26,18 @@ const noPackage = new FormatError(own, 'byte 0', 'a texmesh package', 'status 20
 const cases: [string, unknown, string, keyof Words, RegExp][] = [
   ['a file that is not there', asked(own, 'status 404'), own, 'missing', /status 404/],
   ['a file for others', asked(own, 'status 403 (text/html)'), own, 'missing', /status 403/],
+  ['a server that has too much to do', asked(own, 'status 429'), own, 'unreachable', /status 429/],
   ['a server that fails', asked(own, 'status 503'), own, 'unreachable', /503/],
   ['no answer', asked(own, 'Failed to fetch'), own, 'unreachable', /did not answer\.$/],
   ['no answer from elsewhere', asked(foreign, 'Failed to fetch'), foreign, 'unreachable',
     /https:\/\/museum\.example.*Access-Control-Allow-Origin \(CORS\)/],
   ['a start page in its place', noPackage, own, 'unreadable', /start page/],
   ['damage', new FormatError(own, 'mesh', '3 bytes', '2', 'I08'), own, 'unreadable', /I08 is a rule of/],
+  ['another file', new FormatError(own, 'byte 9', 'the file that reading began with',
+    'another ETag: it was replaced, open it anew'), own, 'unreadable', /same ETag/],
+  ['decoders that a page forbids', new Error('the decoder of meshes gives no answer'), own, 'unreadable',
+    /Content-Security-Policy.*wasm-unsafe-eval/],
+  ['no WebGL', new Error('Error creating WebGL context.'), own, 'no3d', /^$/],
   ['a mistake of ours', new TypeError('x is undefined'), own, 'unreadable', /^$/],
   ['no error at all', 'gone', own, 'unreadable', /^$/],
 ];

@@ -132,6 +132,27 @@ describe('trouble', () => {
   it('a length that no answer tells is legal', async () => {
     expect(await readSome(await openRetrying(range(() => 'no-total')))).toBe(expected);
   });
+  it('a server may answer less than was asked for, but not crumbs', async () => {
+    const server = range(() => 'part');
+    expect(await readSome(await openRetrying(server))).toBe(expected);
+    expect(server.log.slice(0, 4).map((r) => r.range![0])).toEqual([0, 5000, 10000, 15000]);
+    const error = await rejection(openRetrying(range(() => 'crumb')));
+    expect(error.message).toContain('an answer with status 206');
+  });
+  it('a server that says when it wants to be asked again is asked then', async () => {
+    const started = performance.now();
+    await openRetrying(range(once('busy', 0)));
+    expect(performance.now() - started).toBeGreaterThan(900);
+  });
+  it('a server that answers nothing any more is asked once for each thing', async () => {
+    const server = range(({ number }) => number > 0 && 'status-500');
+    const reader = await openRetrying(server);
+    const asked = Array.from({ length: 20 }, (_, i) => i);
+    for (const i of asked) await rejection(reader.store.read({ path: 'x', offset: 20000 + i, bytes: 9 },
+      { offset: 20000 + i, bytes: 9 }, { kind: 'other' }));
+    expect(server.log.length).toBeGreaterThan(20);
+    expect(server.log.length).toBeLessThan(40); // not 60
+  });
   it('a cut transfer goes on where it broke', async () => {
     const server = range(once('cut', 0));
     await openRetrying(server);

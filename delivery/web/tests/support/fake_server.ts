@@ -5,7 +5,7 @@ export interface Fault {
 }
 export type FaultKind = 'status-500' | 'status-404' | 'status-416' | 'refused' | 'cut' | 'stall' | 'short'
   | 'long' | 'whole' | 'whole-other' | 'whole-longer' | 'flip' | 'flip-last' | 'wrong-range' | 'other-etag'
-  | 'page' | 'no-total';
+  | 'page' | 'no-total' | 'part' | 'crumb' | 'busy';
 
 export interface FakeServer {
   fetch: typeof fetch;
@@ -37,6 +37,7 @@ export function fakeServer(files: Record<string, Uint8Array>,
       return new Response('<!doctype html><title>Sign in</title>',
         { headers: { 'Content-Type': 'text/html; charset=utf-8' } });
     if (kind === 'status-500') return new Response('', { status: 500 });
+    if (kind === 'busy') return new Response('', { status: 429, headers: { 'Retry-After': '1' } });
     if (kind === 'status-416') return new Response('', { status: 416 });
     if (!file || kind === 'status-404') return new Response('', { status: 404 });
     const headers = new Headers();
@@ -47,7 +48,8 @@ export function fakeServer(files: Record<string, Uint8Array>,
     let status = 200;
     if (range && options.ranges !== false && !kind?.startsWith('whole')) {
       if (range[0] >= file.length) return new Response('', { status: 416 });
-      const last = Math.min(range[1], file.length - 1);
+      const most = kind === 'part' ? 5000 : kind === 'crumb' ? 10 : Infinity;
+      const last = Math.min(range[1], file.length - 1, range[0] + most - 1);
       body = file.slice(range[0], last + 1);
       status = 206;
       const shift = kind === 'wrong-range' ? 64 : 0;
