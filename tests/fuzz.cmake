@@ -19,7 +19,8 @@ endforeach()
 foreach(name batch/build_memo batch/fleet/run_summary batch/plan compile/options compile/workers/worker_pool)
   list(APPEND sources ${PROJECT_SOURCE_DIR}/pipeline/${name}.cpp)
 endforeach()
-list(APPEND sources ${PROJECT_SOURCE_DIR}/stages/geometry/mesh_topology.cpp ${PROJECT_SOURCE_DIR}/stages/geometry/texel_coverage.cpp)
+list(APPEND sources ${PROJECT_SOURCE_DIR}/stages/geometry/mesh_topology.cpp ${PROJECT_SOURCE_DIR}/stages/geometry/texel_coverage.cpp
+  ${PROJECT_SOURCE_DIR}/stages/zim/zim.cpp)
 list(FILTER sources EXCLUDE REGEX "/stages/image/readers_module/module")
 # Sections: what only other targets or stages call is not linked, and
 # its counters with it, with lld alone.

@@ -47,6 +47,8 @@ std::size_t prefix_bytes(const std::string& folder) {
   return folder.size() + (folder.ends_with('/') ? 0 : 1);
 }
 
+constexpr const char* kCollectionName = "collection.json";  // as the documents call it
+
 /// By its name: a scan in a format that texmesh does not read.
 bool is_other_model(const std::string& path) {
   static constexpr std::string_view kEndings[] = {".3ds",  ".abc",  ".blend", ".dae", ".e57", ".fbx", ".las",
@@ -90,6 +92,10 @@ std::vector<std::string> model_paths(const std::string& folder, Notes* notes) {
                       fmt::format("{} of formats that texmesh does not read {} left out, {} among them",
                                   others.size() == 1 ? "1 file" : fmt::format("{} files", others.size()),
                                   others.size() == 1 ? "is" : "are", *std::ranges::min_element(others))});
+  if (notes && fs::exists(fs::path(folder) / kCollectionName, ec))
+    notes->push_back({Severity::kWarning, "collection-not-read", folder,
+                      fmt::format("its {0} is not read: compile {1} itself to use its titles and options",
+                                  kCollectionName, (fs::path(folder) / kCollectionName).string())});
   return models;
 }
 

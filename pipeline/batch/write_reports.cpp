@@ -180,8 +180,9 @@ std::string write_statistics(const std::vector<WorkerReport>& reports) {
                        rows[stage].seconds);
   const auto not_run =
       std::count_if(reports.begin(), reports.end(), [](const WorkerReport& r) { return !r.ran; });
-  return out + fmt::format("{:<20} {:>7} {:>11} {:>10.2f}\n{} of {} models needed no look at their stages\n",
-                           "all", all.ran, all.hits, all.seconds, not_run, reports.size());
+  return out +
+         fmt::format("{:<20} {:>7} {:>11} {:>10.2f}\n{} of {} models were skipped: nothing had changed\n",
+                     "all", all.ran, all.hits, all.seconds, not_run, reports.size());
 }
 
 std::string write_depfile(const std::string& target, const std::vector<std::string>& dependencies) {

@@ -121,15 +121,15 @@ std::string textures_text(PackageReader& package, const DeliveryPlan& p, const F
                         p.textures.rungs.size(), p.textures.skipped, p.mean_quality, p.worst_quality);
   if (const std::string rungs = rungs_text(package, p, list); !rungs.empty())
     text += "rungs (fragments x quality): " + rungs + "\n";
-  for (const std::string& w : p.warnings) text += "warning: " + w + "\n";
+  for (const std::string& w : p.warnings) text += "note: " + w + "\n";
   return text;
 }
 
 /// `timed`: of a plan over a link, not of a budget.
 std::string plan_text(PackageReader& package, const DeliveryPlan& p, const FragmentList& list, bool timed) {
   std::string text =
-      fmt::format("{}, predicted FLIP {:.4f} (0 = equal to the source), {:.4f} by the textures alone\n",
-                  shown_text(p), p.flip, p.texture_flip);
+      fmt::format("{}, predicted FLIP {:.4f} (0 = equal to the source){}\n", shown_text(p), p.flip,
+                  p.proxy ? "" : fmt::format(", {:.4f} by the textures alone", p.texture_flip));
   if (timed)
     text += fmt::format("first picture {} ({} bytes), mesh complete {}, textures {}\n",
                         moment(p.first_picture_s), grouped(p.bootstrap_bytes + p.first_picture_bytes),
@@ -185,6 +185,8 @@ int run_check(const CheckArguments& args) {
     std::cout << to_json_line(PlanDocument{plan, planes, true, reasons.empty(), reasons}) << '\n';
   } else {
     std::cout << plan_text(package, plan, list, true) << gate_text(results);
+    if (args.gate.max_flip >= 1 && args.gate.max_texture_flip >= 1)
+      std::cout << "note: no limit of quality was given; --max-flip 0.1 sets one\n";
   }
   return reasons.empty() ? kExitOk : kExitDifferent;
 }

@@ -273,10 +273,13 @@ int run_site(SiteArguments& args) {
   NewFolder(args.folder, site_folder_rule());  // not after the work
   const Site site = read_site(args.packages, options);
   for (const SiteFault& f : site.faults) std::cerr << "texmesh: " << printable(f.message) << '\n';
+  for (const std::string& path : site.stale)
+    std::cerr << "note: " << printable(path)
+              << " is left out: no model makes this package any more (compile --remove-stale removes it)\n";
   write_site(site, args.folder);
   const std::string page = (std::filesystem::path(args.folder) / "index.html").string();
   if (args.json)
-    std::cout << to_json_line(SiteReport{page, site.objects, site.faults}) << '\n';
+    std::cout << to_json_line(SiteReport{page, site.objects, site.faults, site.stale}) << '\n';
   else
     std::cout << page << ", " << site.objects.size()
               << (site.objects.size() == 1 ? " object\n" : " objects\n");
@@ -571,7 +574,7 @@ void add_site_command(Command& app) {
       "can serve them from any folder. They ask other servers for packages at --packages-url alone. That "
       "server must allow pages of others to read ranges (CORS). If you open the files without a server, "
       "browsers show the list but no object in 3D.\n"
-      "If a package cannot be read, site leaves it out and says so.\n"
+      "If a package cannot be read, site leaves it out and says so, as with one that no model makes any more.\n"
       "Exit code: 0, 1 when a package could not be read (the site has the others) or DIR not be written, "
       "2 usage.");
 }

@@ -217,19 +217,21 @@ std::string extract_text(const Extracted& e) {
                                  grouped(e.triangles));
   for (std::size_t l = 1; l < e.levels.size(); ++l)
     text += fmt::format("{} S_{}", l == 1 ? ", levels" : ",", e.levels[l]);
-  text += fmt::format("; mesh {} bytes\n", grouped(e.mesh_bytes));
+  const bool is_whole_proxy = e.proxy && e.images.empty();
+  text +=
+      is_whole_proxy ? ", as the package has it\n" : fmt::format("; mesh {} bytes\n", grouped(e.mesh_bytes));
   for (const ExtractedImage& i : e.images) {
     text += fmt::format("  image {}, {}: {} x {} px, {}", i.image, i.role, i.width_px, i.height_px,
                         enum_name(i.format));
-    if (i.format != FileImage::kPng) text += fmt::format(" of quality {:.4g}", i.quality);
+    if (i.format != FileImage::kPng) text += fmt::format(" of quality {:.0f}", i.quality);
     text += fmt::format(", {} bytes\n", grouped(i.bytes));
   }
   if (e.asked_bytes > 0)
-    text += fmt::format(
-        "difference to the package's best (FLIP of lit pictures{} of {} px): {:.4f}; of the mesh alone "
-        "{:.4f}\n",
-        e.views > 0 ? fmt::format(", {} views", e.views) : ", as tables tell it,", e.side_px, e.difference,
-        e.mesh_difference);
+    text += fmt::format("difference to the package's best (FLIP of lit pictures {}): {:.4f}{}\n",
+                        e.views > 0 ? fmt::format("of {} px, {} views", e.side_px, e.views)
+                                    : fmt::format("predicted by the package's tables for {} px", e.side_px),
+                        e.difference,
+                        e.proxy ? "" : fmt::format("; of the mesh alone {:.4f}", e.mesh_difference));
   if (!e.within)
     text += fmt::format("{} bytes cannot be kept: this is the smallest file that the package gives\n",
                         grouped(e.asked_bytes));

@@ -392,13 +392,14 @@ DeliveryPlan plan_budget(PackageReader& package, const DeliveryRequest& request,
     plan.textures.bytes = budget.bytes;
     plan.textures.skipped = static_cast<std::uint32_t>(std::ranges::count(budget.rungs, -1));
     rate(package, request.displayed_px, budget.list, plan);
-    if (fixed > bytes)
-      plan.warnings.push_back("mesh and tables alone take " + std::to_string(fixed) + " bytes");
     take_better(std::move(plan), bytes, best);
   }
   for (std::size_t k = 0; k < m.proxies.size() && request.scale < 0; ++k)
     if (proxy_fits(m, request, k)) take_better(plan_of_proxy(m, request.displayed_px, k), bytes, best);
   if (!best) package.scale_index(wanted);  // says which there are
+  if (best->bytes() > bytes)
+    best->warnings.push_back(std::to_string(bytes) + " bytes cannot be kept: the least that is shown takes " +
+                             std::to_string(best->bytes()));
   count_memory(package, request, *best);
   return *best;
 }

@@ -170,8 +170,12 @@ std::unique_ptr<PackageStore> open_folder(const std::string& path) {
 std::unique_ptr<PackageStore> open_store(const std::string& path) {
   if (is_url(path)) return open_url(path);
   std::error_code error;
-  if (fs::is_directory(path, error)) return open_folder(path);
-  return open_container(open_file_source(path));
+  if (!fs::is_directory(path, error)) return open_container(open_file_source(path));
+  if (!fs::exists(fs::path(path) / kManifestPath, error))
+    for (fs::directory_iterator it(path, error), end; !error && it != end; it.increment(error))
+      if (it->path().extension() == ".texmesh")
+        throw InputError(path, "", "a package", "a folder of packages; name one of them");
+  return open_folder(path);
 }
 
 }  // namespace texmesh

@@ -429,6 +429,7 @@ class PlyModel {
     build_mesh();
     tiled_.split(model_, resolver_, file_, options_);
     add_notes(lost);
+    show_without_colour(model_);
     finish_model(model_, file_, options_);
     judge_alpha(model_, context_);
     return std::move(model_);

@@ -386,6 +386,7 @@ ImportedModel import_range_scan(const std::string& file_name, std::span<const st
   context.check_cancelled();
   GridMesher(scan, out.model).run();
   add_material(file_name, texture, resolver, options, out.model);
+  show_without_colour(out.model);
   finish_model(out.model, file_name, options);
   judge_alpha(out.model, context);
   return out;

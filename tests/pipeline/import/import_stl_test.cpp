@@ -71,6 +71,12 @@ TEST(ImportStl, BinaryAsciiAndBinaryThatBeginsWithSolid) {
   expect_tetrahedron(import(bytes_of(ascii_stl("\r"))));
 }
 
+TEST(ImportStl, WhatHasNoColourIsGreyAndSaysSo) {
+  const Model model = import_stl("m.stl", binary_stl(kTetrahedron), {}, {}).model;
+  EXPECT_EQ(model.materials.at(0).base_colour, (Vec4f{0.6f, 0.6f, 0.6f, 1}));
+  EXPECT_EQ(count_notes(model, "no-colour"), 1);
+}
+
 TEST(ImportStl, BytesBehindTheTrianglesAreTolerated) {
   Bytes bytes = binary_stl(kTetrahedron);
   bytes.push_back(7);

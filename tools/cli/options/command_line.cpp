@@ -8,7 +8,6 @@
 
 #include <CLI/CLI.hpp>
 #include <cstdlib>
-#include <filesystem>
 #include <map>
 #include <set>
 #include <sstream>
@@ -39,10 +38,9 @@ constexpr std::size_t kTextColumn = 28;
 
 std::size_t help_width() {
   constexpr int kLeast = 60, kMost = 100;
-  winsize window{};
   const char* columns = std::getenv("COLUMNS");
   int width = columns != nullptr ? std::atoi(columns) : 0;
-  if (width <= 0 && ::ioctl(STDOUT_FILENO, TIOCGWINSZ, &window) == 0) width = window.ws_col;
+  if (winsize window{}; width <= 0 && ::ioctl(STDOUT_FILENO, TIOCGWINSZ, &window) == 0) width = window.ws_col;
   return static_cast<std::size_t>(std::clamp(width > 0 ? width : kMost, kLeast, kMost));
 }
 
@@ -383,7 +381,7 @@ std::string bash_completion(const CLI::App& program, const HelpNotes& notes) {
   for (const NamedCommand& c : commands) {
     Words names, words;
     for (const CLI::Option* o : c.app->get_options())
-      for (const std::string& name : option_words(*o)) names.push_back(name);
+      std::ranges::copy(option_words(*o), std::back_inserter(names));
     for (const DescribedWord& w : first_words(*c.app, notes)) words.push_back(w.word);
     cases += fmt::format("    (\"{}\") options=({}); words=({}) ;;\n", c.path, in_a_row(names, " "),
                          in_a_row(words, " "));
@@ -441,8 +439,8 @@ std::string refusal(const CLI::App& program, const CLI::ParseError& e) {
   const CLI::App* app = &program;
   std::string path = program.get_name();
   for (; !app->get_subcommands().empty(); path += " " + app->get_name()) app = app->get_subcommands().back();
-  const bool any_option = !first_unknown(*app, true).empty();
-  if (e.get_name() == "RequiredError" && app->get_require_subcommand_min() > 0 && !any_option) {
+  const std::string name = first_unknown(*app, true);
+  if (e.get_name() == "RequiredError" && app->get_require_subcommand_min() > 0 && name.empty()) {
     Words names;
     for (const CLI::App* c : app->get_subcommands(std::function<bool(const CLI::App*)>()))
       if (!c->get_group().empty()) names.push_back(c->get_name());
@@ -452,16 +450,14 @@ std::string refusal(const CLI::App& program, const CLI::ParseError& e) {
                             : ": there is no command " + written + meant_instead(written, names)) +
            " (" + path + " --help lists the commands)";
   }
-  if (e.get_name() != "ExtrasError" && !any_option)
+  if (e.get_name() != "ExtrasError" && name.empty())
     return path + ": " + e.what() + " (" + path + " --help tells more)";
-  if (!any_option) return path + ": expected no further argument, found " + first_unknown(*app, false);
+  if (name.empty()) return path + ": expected no further argument, found " + first_unknown(*app, false);
   Words names;
   for (const CLI::Option* o : app->get_options())
-    for (const std::string& name : option_words(*o)) names.push_back(name);
-  const std::string name = first_unknown(*app, true);
-  std::error_code error;
-  const std::string meant =
-      std::filesystem::exists(name, error) ? "; of the file say ./" + name : meant_instead(name, names);
+    std::ranges::copy(option_words(*o), std::back_inserter(names));
+  const bool is_file = ::access(name.c_str(), F_OK) == 0;
+  const std::string meant = is_file ? "; of the file say ./" + name : meant_instead(name, names);
   return path + ": there is no option " + name + meant + " (" + path + " --help lists the options)";
 }
 

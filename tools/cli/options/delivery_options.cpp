@@ -258,7 +258,7 @@ std::string simulated_text(const DeliveryPlan& p, double limit_s) {
       grouped(r.bytes), r.rungs.size(), r.skipped, p.mean_quality, p.worst_quality, p.flip);
   for (std::size_t i = 0; r.mirrors.size() > 1 && i < r.mirrors.size(); ++i)
     text += server_text(fmt::format("server {}", i + 1), r.mirrors[i]);
-  for (const std::string& w : p.warnings) text += "warning: " + w + "\n";
+  for (const std::string& w : p.warnings) text += "note: " + w + "\n";
   return text;
 }
 

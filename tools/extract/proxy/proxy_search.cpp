@@ -608,7 +608,19 @@ class ProxySearch {
     const bool learns = !reference_.wishes.best();
     const double fixed = learns ? static_cast<double>(whole.finish().size()) : 0;  // bytes without pictures
     const double room = static_cast<double>(bytes_) - fixed, most = quick ? kRoughlyMost * room : room;
-    if (learns && !maps.empty() && room <= 0) return out.glb = whole.finish(), false;
+    const auto take = [&](double quality) {
+      out.glb = file_at(quality);
+      draft.set_images(made[quality].files);
+      out.images = made[quality].rows;
+      out.mesh_bytes = out.glb.size();
+      out.triangles = parts.triangles(trial.mesh);
+      for (const ExtractedImage& i : out.images) out.mesh_bytes -= i.bytes;
+    };
+    if (learns && !maps.empty() && room <= 0) {  // the least that there is, where nothing fits
+      take(kLowestQuality);
+      if (!reference_.wishes.fast()) measure(draft.finish(), out);
+      return false;
+    }
     double start = 50;  // bytes of a texel grow about as exp(quality / 30)
     if (rate_.texels > 0)
       start = rate_.quality + 30 * portable::log(rate_.texels / texels * room / rate_.bytes);
@@ -619,13 +631,8 @@ class ProxySearch {
                             ? kHighestQuality
                             : quality_for(most, start, quick ? kRoughly : kNearlyAll,
                                           quick ? kQuickTries : kQualityTries, bytes_of_pictures, learns);
-    out.glb = file_at(best);
+    take(best);
     const double filled = maps.empty() ? room : std::max(static_cast<double>(out.glb.size()) - fixed, 1.0);
-    draft.set_images(made[best].files);
-    out.images = made[best].rows;
-    out.mesh_bytes = out.glb.size();
-    out.triangles = parts.triangles(trial.mesh);
-    for (const ExtractedImage& i : out.images) out.mesh_bytes -= i.bytes;
     if (!(quick ? filled <= most : fits(out))) return false;
     if (!reference_.wishes.fast()) measure(draft.finish(), out, in_whole);
     if (!quick) return best >= kPoorQuality;

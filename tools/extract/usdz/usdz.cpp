@@ -552,15 +552,17 @@ class UsdzFiles {
   /// A mesh takes more bytes here than coded in a GLB, so the GLB must be smaller than the wish: by the ratio
   /// of the two, then between the largest one that kept within it and the smallest that did not.
   Extracted within(std::uint64_t bytes) {
-    constexpr int kTries = 4;
-    constexpr double kNearEnough = 0.95;
+    constexpr int kTries = 4, kMostTries = 16;
+    constexpr double kNearEnough = 0.95, kLeastStep = 0.8;
     const auto wish = static_cast<double>(bytes);
     double low = 0, high = wish, next = wish;
     std::optional<Extracted> best, smallest;
-    for (int k = 0; k < kTries; ++k) {
+    bool is_least = false;
+    for (int k = 0; best ? k < kTries : k < kMostTries && !is_least; ++k) {
       std::get<ExtractBudget>(request_.file).bytes = {static_cast<std::uint64_t>(std::max(next, 1.0))};
       Extracted file = extract_model(package_, request_, context_);
       const auto glb = static_cast<double>(file.glb.size());
+      is_least = !file.within;
       file = converted(std::move(file));
       const auto size = static_cast<double>(file.glb.size());
       const bool fits = size <= wish;
@@ -571,7 +573,7 @@ class UsdzFiles {
         low = next;
       else
         high = std::min(next, glb);
-      next = low > 0 ? (low + high) / 2 : high * wish / size;
+      next = low > 0 ? (low + high) / 2 : std::min(high * wish / size, kLeastStep * high);
     }
     Extracted out = best ? std::move(*best) : std::move(*smallest);
     out.asked_bytes = bytes;

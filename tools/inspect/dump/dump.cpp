@@ -98,7 +98,8 @@ std::vector<StreamFigures> stream_figures(const SplitStreamHead& head) {
 }
 
 std::string vector_text(const Vec3d& v) {
-  return fmt::format("{}  {}  {}", shortest(v.x, 7), shortest(v.y, 7), shortest(v.z, 7));
+  const auto text = [](double x) { return shortest(x + 0.0, 7); };  // no -0
+  return fmt::format("{}  {}  {}", text(v.x), text(v.y), text(v.z));
 }
 
 std::array<double, 3> numbers(const Vec3d& v) { return {v.x, v.y, v.z}; }
@@ -136,6 +137,20 @@ Table scales_table(const Manifest& m) {
     table.row({s.scale, s.triangles, s.vertices, s.glb.bytes, s.has_glb() ? "file" : "stream", s.major,
                s.error_max, s.error_rms, s.p95, s.p99, pixels(s.display_px_flip), pixels(s.display_px_jnd),
                pixels(s.display_px_error), pixels(s.display_px_edge)});
+  return table;
+}
+
+/// What the first page says of scales.
+Table few_columns_of_scales(const Manifest& m) {
+  Table table(
+      "scales (flip [px] = displayed height up to which nobody tells the scale from S_0 in lit pictures)",
+      {{"scale", kScaleName},
+       {"triangles", kGrouped},
+       {"kB", kKilobytes},
+       {"max error", kShortest},
+       {"flip", {}, "", "px"}});
+  for (const ManifestScale& s : m.scales)
+    table.row({s.scale, s.triangles, s.glb.bytes, s.error_max, pixels(s.display_px_flip)});
   return table;
 }
 
@@ -297,11 +312,18 @@ std::uint64_t bytes_of_kinds(const std::vector<KindBytes>& kinds) {
   return sum;
 }
 
+std::string floors_text(const Manifest& m) {
+  std::string out;
+  for (const ManifestScale& s : m.scales)
+    if (!s.floor.empty()) out += fmt::format("S_{} is no coarser: {}\n", s.scale, printable(s.floor));
+  return out;
+}
+
 std::string scales_text(PackageReader& p, DumpGamma) {
-  std::string floors;
-  for (const ManifestScale& s : p.manifest().scales)
-    if (!s.floor.empty()) floors += fmt::format("S_{} is no coarser: {}\n", s.scale, printable(s.floor));
-  return scales_table(p.manifest()).text() + floors;
+  const Manifest& m = p.manifest();
+  const std::string stream =
+      m.stream ? stream_table(p.split_stream_head()).text() : "vertex-split stream: none\n";
+  return scales_table(m).text() + floors_text(m) + "\n" + stream + "\n" + steps_text(m);
 }
 
 std::string summary_text(PackageReader& p, DumpGamma) {
@@ -321,11 +343,10 @@ std::string summary_text(PackageReader& p, DumpGamma) {
     s += fmt::format("poster    {} x {} px, {} kB\n", m.poster->width_px, m.poster->height_px,
                      kilobytes(m.poster->bytes));
   if (m.annotations) s += fmt::format("notes     {}\n", notes_words(count_notes(p.annotations(), m)));
-  const std::string stream =
-      m.stream ? stream_table(p.split_stream_head()).text() : "vertex-split stream: none\n";
   const std::string textures = p.textures().empty() ? "textures: none\n" : textures_table(p).text();
-  return s + start_text(m) + scales_text(p, {}) + "\n" + proxies_text(m) + stream + "\n" + steps_text(m) +
-         "\n" + textures + "\n" + bytes.text() + "\n" + options_text(provenance);
+  return s + start_text(m) + few_columns_of_scales(m).text() + floors_text(m) +
+         "dump PKG scales tells more of them\n\n" + proxies_text(m) + textures + "\n" + bytes.text() + "\n" +
+         options_text(provenance);
 }
 
 Json summary_json(PackageReader& p, DumpGamma) {

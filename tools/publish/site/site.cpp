@@ -463,7 +463,7 @@ std::string object_name(const std::string& path) {
 }
 
 Site read_site(const std::string& packages, const SiteOptions& options) {
-  Site site{options, {}, {}};
+  Site site{options, {}, {}, {}};
   const PackageFolder folder = find_packages(packages);
   const std::set<std::string> stale = listed_stale(folder.path);
   std::map<std::string, std::string> taken;  // path of the package, by the name of its pages
@@ -472,9 +472,7 @@ Site read_site(const std::string& packages, const SiteOptions& options) {
     object.path = path;
     object.name = object_name(path);
     if (stale.contains(path)) {
-      site.faults.push_back(
-          {path,
-           path + ": left out: no model makes this package any more (compile --remove-stale removes it)"});
+      site.stale.push_back(path);
       continue;
     }
     if (const auto [other, fresh] = taken.emplace(object.name, path); !fresh) {

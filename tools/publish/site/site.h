@@ -69,10 +69,12 @@ struct Site {
   SiteOptions options;
   std::vector<SiteObject> objects;  // by title
   std::vector<SiteFault> faults;
+  std::vector<std::string> stale;  // paths of packages that no model makes any more
 };
 
 /// What a folder of packages (or one package) holds: every package beneath it, hidden ones and symbolic links
-/// left out. A package that cannot be read is a fault, the others go on. InputError when there is none at
+/// left out. A package that cannot be read is a fault, the others go on; one that no model makes any more is
+/// left out. InputError when there is none at
 /// all.
 Site read_site(const std::string& packages, const SiteOptions& options);
 
@@ -91,11 +93,13 @@ struct SiteReport {
   std::string page;
   std::vector<SiteObject> objects;
   std::vector<SiteFault> faults;
+  std::vector<std::string> stale;
   static void fields(auto& s, auto&& v) {
     v("version", Constant{1}, "");
     v("page", s.page, FieldRule{.pattern = "."}, "Path of index.html.");
     v("objects", s.objects, "In the order of the page.");
     v("faults", s.faults, "Packages that could not be read and are not in the site.");
+    v("stale", s.stale, "Packages that no model makes any more and that are not in the site.");
   }
 };
 
