@@ -66,6 +66,14 @@ JsonShape scan_json_shape(std::span<const std::uint8_t> json, int max_depth) {
   return shape;
 }
 
+/// "line 3, column 7" of the byte that counts from 1.
+static std::string line_and_column(std::span<const std::uint8_t> text, std::size_t byte) {
+  const auto before = text.first(std::min(byte > 0 ? byte - 1 : 0, text.size()));
+  const auto line = std::ranges::count(before, '\n') + 1;
+  const auto column = std::ranges::find(before.rbegin(), before.rend(), '\n') - before.rbegin() + 1;
+  return "line " + std::to_string(line) + ", column " + std::to_string(column);
+}
+
 nlohmann::ordered_json parse_bounded_json(std::span<const std::uint8_t> bytes, const std::string& document,
                                           int max_depth) {
   using Json = nlohmann::ordered_json;
@@ -74,7 +82,7 @@ nlohmann::ordered_json parse_bounded_json(std::span<const std::uint8_t> bytes, c
   try {
     return Json::parse(bytes.begin(), bytes.end());
   } catch (const nlohmann::json::parse_error& e) {
-    throw FormatError(document, "byte " + std::to_string(e.byte), "JSON", "a syntax error");
+    throw FormatError(document, line_and_column(bytes, e.byte), "JSON", "a syntax error");
   } catch (const nlohmann::json::out_of_range&) {
     throw FormatError(document, "", "JSON numbers that fit a double", "a larger one");
   }

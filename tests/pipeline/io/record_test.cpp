@@ -123,6 +123,16 @@ TEST(Record, SaysWhatIsWrongAndWhere) {
   EXPECT_EQ(fault_of(3), ": an object, 3");
 }
 
+TEST(Record, ASyntaxErrorHasItsLineAndColumn) {
+  const std::string text = "{\n  \"a\": 1,\n  \"b\" 2\n}\n";
+  try {
+    parse_document({reinterpret_cast<const std::uint8_t*>(text.data()), text.size()}, 1000, 8, "a.json");
+    FAIL();
+  } catch (const InputError& e) {
+    EXPECT_EQ(e.place(), "line 3, column 7");
+  }
+}
+
 TEST(Record, HasASchema) {
   const Json schema = schema_of<Outer>();
   EXPECT_EQ(schema["required"], Json({"version", "name", "path", "is_set", "bytes", "seconds", "fruit",
