@@ -518,6 +518,8 @@ class UrlStore final : public HttpStore {
     if (place_.ranges && !whole)
       throw FormatError(shown_url(root), kManifestPath, "the range that was asked for", "another");
     tree_ = std::make_unique<HttpTree>(root, pool_, place_.ranges);
+    // A store may keep JSON compressed, whatever is asked for. Whole answers are decoded.
+    if (is_compressed(manifest)) return tree_->file(kManifestPath, kBootstrapBytes);
     tree_->store(kManifestPath, manifest.body);
     return std::move(manifest.body);
   }

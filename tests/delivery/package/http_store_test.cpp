@@ -323,6 +323,22 @@ Files tree_files() {
   return files;
 }
 
+TEST(HttpStore, JsonThatAStoreKeepsCompressedIsRead) {
+  const Files files = tree_files();
+  for (const char* path : {"/a.texmesh", "/a/"})
+    EXPECT_EQ(said_of(
+                  [&](const Request& r) {
+                    const auto it = files.find(r.path);
+                    if (it == files.end()) return answer(r.path == "/a.texmesh" ? 200 : 404, "", package());
+                    const bool json = r.path.ends_with(".json");
+                    return answer(200, json ? "Content-Encoding: gzip\r\n" : "",
+                                  json ? gzipped(it->second) : it->second);
+                  },
+                  path),
+              "")
+        << path;
+}
+
 TEST(HttpStore, SizesThatNoEntryHasAreNotAskedFor) {
   const auto hostile = [](const std::function<void(Manifest&)>& change, const std::string& path) {
     Files files = tree_files();
