@@ -207,7 +207,8 @@ void show_without_colour(Model& model) {
   const auto has_none = [](const Material& m) { return m == scan_material(m.name); };
   if (!model.mesh.colours.empty() || !std::ranges::all_of(model.materials, has_none)) return;
   for (Material& m : model.materials) m.base_colour = {kGrey, kGrey, kGrey, 1};
-  add_info(model.notes, "no-colour", "", "the scan has no colour and is shown in light grey");
+  if (model.notes.empty())  // else they say what is missing
+    add_info(model.notes, "no-colour", "", "the scan has no colour and is shown in light grey");
 }
 
 void triangulate_polygon(std::span<const Vec3d> points, std::vector<std::array<std::uint32_t, 3>>& triangles,

@@ -25,7 +25,8 @@ float linear_from_srgb(double srgb);
 /// of OBJ, PLY and STL show a surface (open scans would have holes otherwise).
 Material scan_material(std::string name);
 
-/// Where nothing of a scan has a colour, light grey, with a note: in white nobody sees its shape.
+/// Where nothing of a scan has a colour, light grey: in white nobody sees its shape. A note says so where no
+/// other note stands.
 void show_without_colour(Model& model);
 
 /// What one corner of a face carries. Attributes the mesh has not got stay as they are here.

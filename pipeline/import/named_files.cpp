@@ -142,8 +142,7 @@ class Finder {
     for (const auto* names : {&inside_, &beside_})
       for (const std::string& name : *names)
         for (const std::string& from : {folder, std::string()})
-          for (const char* of : {"", "textures", "Textures", "tex", "maps", "images"})
-            add(moved, beneath_model(from + of, last_part(name)));
+          for (const char* of : {"", "textures"}) add(moved, beneath_model(from + of, last_part(name)));
     std::erase_if(moved, [this](const std::string& name) {
       return std::ranges::find(inside_, name) != inside_.end() ||
              std::ranges::find(beside_, name) != beside_.end();

@@ -32,9 +32,10 @@ struct NamedFile {
 /// - Where all of this finds nothing, the only file whose name differs in case or composition alone is taken
 ///   with the warning "similar-name"; where there is none, the only picture whose ending differs, too, with
 ///   "other-ending".
-/// - Last, the file of the name's last part in the same two folders, or in their folder textures, Textures,
-/// tex,
-///   maps or images, is taken with the warning "moved-file".
+/// - Last, the file of the name's last part in the same two folders, or in their folder textures, is taken
+/// with
+///   the warning "moved-file". Each further folder would cost a hostile model with many names a look for
+///   each.
 /// What must not be read counts as missing. InputError when the file is longer than max_bytes.
 NamedFile find_file(const NameInModel& name, Resolver& resolver, std::uint64_t max_bytes, Notes& notes,
                     const std::string& place);

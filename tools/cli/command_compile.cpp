@@ -610,7 +610,13 @@ void add_summary_command(Command& app) {
       "without a summary.\n"
       "Exit code: as compile's for the models of all runs; 75 also where a shard is missing or half-written, 1 "
       "also where a summary is foreign.");
-  merge.on_run([args] { return as_usage([&] { return run_merge(*args); }); });
+  merge.on_run([args] {
+    try {
+      return as_usage([&] { return run_merge(*args); });
+    } catch (const PermissionError& e) {  // exit code 1 says that a model failed
+      throw UsageError(e.file(), e.place(), e.expected(), e.found());
+    }
+  });
 }
 
 }  // namespace texmesh

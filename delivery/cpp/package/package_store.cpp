@@ -174,7 +174,8 @@ std::unique_ptr<PackageStore> open_store(const std::string& path) {
   if (!fs::exists(fs::path(path) / kManifestPath, error))
     for (fs::directory_iterator it(path, error), end; !error && it != end; it.increment(error))
       if (it->path().extension() == ".texmesh")
-        throw InputError(path, "", "a package", "a folder of packages; name one of them");
+        throw InputError(path, "", "a package",
+                         "a folder without manifest.json that has packages: name one of them");
   return open_folder(path);
 }
 

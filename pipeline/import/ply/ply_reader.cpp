@@ -44,7 +44,8 @@ class PlyHeaderReader {
         header_.data_offset = text_.size() - lines_.rest().size();
         // Where lines end in a lone CR, an LF that follows is the first byte of the data.
         if (text_.size() > 4 && text_[3] == '\r' && text_[4] != '\n')
-          header_.data_offset = static_cast<std::size_t>(line.data() - text_.data()) + line.size() + 1;
+          header_.data_offset =
+              std::min(static_cast<std::size_t>(line.data() - text_.data()) + line.size() + 1, text_.size());
         header_.lines = lines_.number();
         return std::move(header_);
       }

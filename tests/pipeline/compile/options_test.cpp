@@ -159,7 +159,7 @@ TEST_P(BadProfile, NamesThePlace) {
 }
 INSTANTIATE_TEST_SUITE_P(
     Options, BadProfile,
-    ::testing::Values(Bad{"[]", ""}, Bad{"{", "byte 2"}, Bad{"{}", "/version"},
+    ::testing::Values(Bad{"[]", ""}, Bad{"{", "line 1, column 2"}, Bad{"{}", "/version"},
                       Bad{R"({"version":2})", "/version"}, Bad{R"({"version":1,"sfs":{}})", "/sfs"},
                       Bad{R"({"version":1,"ssf":3})", "/ssf"},
                       Bad{R"({"version":1,"ssf":{"scale":3}})", "/ssf/scale"},

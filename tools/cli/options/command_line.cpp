@@ -456,8 +456,8 @@ std::string refusal(const CLI::App& program, const CLI::ParseError& e) {
   Words names;
   for (const CLI::Option* o : app->get_options())
     std::ranges::copy(option_words(*o), std::back_inserter(names));
-  const bool is_file = ::access(name.c_str(), F_OK) == 0;
-  const std::string meant = is_file ? "; of the file say ./" + name : meant_instead(name, names);
+  if (::access(name.c_str(), F_OK) == 0) return path + ": " + name + " is no option; the file is ./" + name;
+  const std::string meant = meant_instead(name, names);
   return path + ": there is no option " + name + meant + " (" + path + " --help lists the options)";
 }
 
@@ -589,9 +589,7 @@ Option Command::flag(const std::string& names, std::function<void()> on_given, c
 template <class T>
 Option Command::option(const std::string& names, T& value, const std::string& help,
                        const std::string& value_name) {
-  CLI::Option* option = app_->add_option(names, value, help);
-  if constexpr (std::is_same_v<T, std::string> || std::is_same_v<T, std::vector<std::string>>)
-    option->check(empty_fault);
+  CLI::Option* option = app_->add_option(names, value, help)->check(empty_fault);
   return grouped(option->type_name(value_name.empty() ? default_value_name<T>() : value_name));
 }
 template Option Command::option(const std::string&, int&, const std::string&, const std::string&);

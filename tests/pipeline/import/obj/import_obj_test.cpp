@@ -19,7 +19,7 @@ TEST(ImportObj, QuadWithTextureCoordinates) {
   EXPECT_EQ(m.mesh.triangles.size(), 2u);
   EXPECT_EQ(m.mesh.uv0[0], (Vec2f{0, 1})) << "v grows downwards in glTF";
   EXPECT_EQ(m.mesh.uv0[2], (Vec2f{1, 0}));
-  EXPECT_TRUE(m.notes.empty());
+  EXPECT_EQ(count_notes(m, "no-colour"), 1);
 }
 
 TEST(ImportObj, NegativeIndicesAndMixedCorners) {

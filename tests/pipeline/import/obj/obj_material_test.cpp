@@ -40,13 +40,13 @@ TEST(ObjMaterial, LibrariesWithBlanksAndSeveralInOneLine) {
 
 TEST(ObjMaterial, CommentsBehindNamesOfMaterials) {
   const std::string mtl = "newmtl m # the skin\nKd 0 1 0\nnewmtl n #1\nKd 1 0 0\nnewmtl n\n";
-  for (const auto& [name, green] : {std::pair("m", 1), {"m # used", 1}, {"n #1", 0}, {"n #2", 1}}) {
+  for (const auto& [name, green] : {std::pair("m", 1.f), {"m # used", 1.f}, {"n #1", 0.f}, {"n #2", 0.6f}}) {
     MemoryResolver resolver;
     resolver.files["a.mtl"] = bytes_of(mtl);
     const Model model =
         import_text("mtllib a.mtl\n" + kVertices + "usemtl " + name + "\nf 1 2 3\n", resolver);
     EXPECT_EQ(count_notes(model, "missing-material"), 0) << name;
-    EXPECT_EQ(model.materials[0].base_colour.y, static_cast<float>(green)) << name;
+    EXPECT_EQ(model.materials[0].base_colour.y, green) << name;
   }
 }
 

@@ -81,11 +81,19 @@ Bytes rich_ply(bool big) {
   return b.bytes;
 }
 
+TEST(ImportPly, AHeaderOfLoneReturnsMayEndTheFile) {
+  const std::string header =
+      "ply\rformat binary_big_endian 1.0\relement face 1\rproperty list uchar int vertex_indices\rend_header";
+  MemoryResolver resolver;
+  EXPECT_THROW(import_ply("a.ply", testing::bytes_of(header), resolver, {}, {}), InputError);
+}
+
 TEST(ImportPly, AsciiSquare) {
   const Model m = import(kSquare);
   EXPECT_EQ(m.mesh.positions.size(), 4u);
   EXPECT_EQ(m.mesh.triangles, (std::vector<Triangle>{{0, 1, 2}, {0, 2, 3}}));
-  EXPECT_TRUE(m.mesh.uv0.empty() && m.mesh.normals.empty() && m.mesh.colours.empty() && m.notes.empty());
+  EXPECT_TRUE(m.mesh.uv0.empty() && m.mesh.normals.empty() && m.mesh.colours.empty());
+  EXPECT_EQ(count_notes(m, "no-colour"), 1);
   EXPECT_EQ(m.materials.size(), 1u);
   EXPECT_TRUE(m.materials[0].double_sided);
 }

@@ -45,6 +45,15 @@ TEST(Forgiving, AWordThatMeansNothingIsNamedWithOneThatDoes) {
               "--rungs: /1: expected an integer in 1 .. 100");
 }
 
+TEST(Forgiving, AFileWhoseNameBeginsAsAnOptionDoes) {
+  const testing::TemporaryFolder folder;
+  testing::write_text(folder / "-x.glb", "x");
+  const CommandResult r =
+      testing::run_command({TEXMESH_BINARY, "dump", "-x.glb"}, {}, folder.path().string());
+  EXPECT_EQ(r.exit_code, 2);
+  EXPECT_NE(r.errors.find("-x.glb is no option; the file is ./-x.glb"), std::string::npos) << r.errors;
+}
+
 TEST(Forgiving, SizesAndRatesAreReadAsPeopleWriteThem) {
   for (const char* text : {"500kB", "500kb", "500KB", "500k", "500 kB", "0.5 MB", "500000"})
     EXPECT_EQ(parse_bytes(text, "--bytes"), 500'000u) << text;
