@@ -236,7 +236,7 @@ DeliveryPlan plan_at_scale(TextureLoss& loss, const DeliveryRequest& request, in
   const DeliveryPlan fixed_parts = plan;
   plan = with_textures(loss, request, htc, chosen, fixed_parts);
   // A transfer spends bytes less well than a plan that knows them: then fewer texels look better in the time.
-  if (plan.texture_bytes > 0 && plan.flip > kFarFromPlanned * chosen.flip) {
+  if (plan.flip > kFarFromPlanned * chosen.flip) {
     DeliveryPlan again = with_textures(loss, request, htc, choose(kFewerBytes * bytes), fixed_parts);
     if (again.flip < plan.flip) plan = std::move(again);
   }

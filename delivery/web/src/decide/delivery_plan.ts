@@ -110,7 +110,7 @@ function planOfProxy(m: Manifest, { link, displayedPx }: DeliveryRequest, proxy:
   const { flip } = proxyLoss(m, proxy, displayedPx);
   const none = everyGroup(0);
   return {
-    scale: m.scales[m.scales.length - 1].scale, proxy, planes: [], rungs: [], bytes: 0, loss: 0, endS: 0,
+    scale: m.scales[m.scales.length - 1].scale, proxy, planes: [], rungs: [], bytes: 0, endS: 0,
     late: false,
     list: { offers: [], fragments: [], groups: [], groupWeights: everyGroup(1), previewLoss: none },
     flip, textureFlip: flip, fixedBytes: allBytes, firstPictureS, meshS, completeS: meshS,

@@ -41,6 +41,11 @@ export interface InTimeRequest {
     bytes: number) => { planes: PlaneChoice[]; list: FragmentList };
 }
 
+/** FLIP of the picture where all that was planned comes. */
+interface Planned {
+  planned: number;
+}
+
 /** Memory for the textures beside a scale. */
 function texturesWithin({ data: { manifest } }: TextureLoss, { memoryBytes = Infinity }: InTimeRequest,
     scale: number): number {
@@ -48,15 +53,13 @@ function texturesWithin({ data: { manifest } }: TextureLoss, { memoryBytes = Inf
   return memoryBytes - (mesh ? scaleBytes(mesh) : 0);
 }
 
-/**
- * Textures for so many bytes beside one scale, what comes of them in the time, and the FLIP of the picture
- * where all of it comes.
- */
+/** Textures for so many bytes beside one scale, and what comes of them in the time. */
 function* texturesFor(loss: TextureLoss, request: InTimeRequest, scale: number, bytes: number,
-    { plan, linkBytesS }: ReturnType<InTimeRequest['afterMesh']>): Generator<void, [InTime, number]> {
+    { plan, linkBytesS }: ReturnType<InTimeRequest['afterMesh']>): Generator<void, InTime & Planned> {
   const { timeLimitS, initialBytesS, rttS } = plan;
+  const { textures } = request;
   let planned = 1;
-  let spent: Pick<TextureSpending, 'list' | 'planes'> | undefined = request.textures?.(loss, scale, bytes);
+  let spent: Pick<TextureSpending, 'list' | 'planes'> | undefined = textures?.(loss, scale, bytes);
   if (!spent) {
     let best: TextureSpending;
     for (best of budgetSteps(loss, { scale }, Math.floor(bytes))) yield;
@@ -64,30 +67,28 @@ function* texturesFor(loss: TextureLoss, request: InTimeRequest, scale: number, 
     const within = planesWithin(loss, planes, texturesWithin(loss, request, scale), request.ways);
     if (within.some(({ plane }, i) => plane !== planes[i].plane))
       best = spendOn(loss, within, { scale, groupWeights }, Math.floor(bytes));
-    spent = best!;
-    planned = best!.flip;
+    planned = (spent = best!).flip;
   }
   const { list, planes } = spent;
   // In groups, as loads ask for them.
-  const bytesEach = request.textures ? 0 : groupBytes(initialBytesS, rttS, timeLimitS);
-  const { offers, groups } = groupedList(list, bytesEach, initialBytesS * timeLimitS);
+  const { offers, groups } = groupedList(list, textures ? 0 : groupBytes(initialBytesS, rttS, timeLimitS),
+    initialBytesS * timeLimitS);
   const played = simulate(offers, plan, { bytesS: linkBytesS, rttS, connections: request.connections });
-  const rungs = groups.flatMap((group, i) => group.map(() => played.rungs[i]));
+  const rungs = played.rungs.flatMap((rung, i) => groups[i].map(() => rung));
   yield;
   const losses = lossesOf(list, rungs);
   const { data: { quality }, displayedPx } = loss;
-  const flip = pictureFlip(quality, displayedPx, scale, losses);
-  return [{ scale, planes, list, flip, textureFlip: textureFlip(quality, losses), late: timeLimitS <= 0,
-    ...played, rungs }, planned];
+  return { ...played, scale, planes, list, flip: pictureFlip(quality, displayedPx, scale, losses),
+    textureFlip: textureFlip(quality, losses), late: timeLimitS <= 0, rungs, planned };
 }
 /** Textures beside one scale; the generator gives the page a turn between its steps. */
 function* texturesInTime(loss: TextureLoss, request: InTimeRequest, scale: number): Generator<void, InTime> {
   const link = request.afterMesh(scale);
   const bytes = Math.max(0, link.plan.timeLimitS) * link.plan.initialBytesS;
-  const [first, planned] = yield* texturesFor(loss, request, scale, bytes, link);
+  const first = yield* texturesFor(loss, request, scale, bytes, link);
   // A transfer spends bytes less well than a plan that knows them: then fewer texels look better in the time.
-  if (!(first.bytes > 0 && first.flip > farFromPlanned * planned)) return first;
-  const [again] = yield* texturesFor(loss, request, scale, fewerBytes * bytes, link);
+  if (first.flip <= farFromPlanned * first.planned) return first;
+  const again = yield* texturesFor(loss, request, scale, fewerBytes * bytes, link);
   return again.flip < first.flip ? again : first;
 }
 

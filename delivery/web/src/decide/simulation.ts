@@ -85,8 +85,6 @@ export interface Simulated {
   /** Rungs by offer; -1 = skipped. */
   rungs: number[];
   bytes: number;
-  /** Sum of the offers' losses as shown. */
-  loss: number;
   /** End, seconds after the first request. */
   endS: number;
 }
@@ -108,5 +106,5 @@ export function simulate(offers: readonly FragmentOffer[], options: TimePlanOpti
     for (const s of plan.steps) rungs[s.offer] = s.rung;
   }
   const bytes = sumOf(offers.map((f, i) => bytesAtRung(f, rungs[i])));
-  return { rungs, bytes, endS, loss: sumOf(offers.map((f, i) => f.loss[rungs[i] + 1])) };
+  return { rungs, bytes, endS };
 }
