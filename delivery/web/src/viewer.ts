@@ -13,7 +13,7 @@ const longestDecodingS = 30;
 class PromptLoader extends GLTFLoader {
   override parseAsync(...of: Parameters<GLTFLoader['parseAsync']>): ReturnType<GLTFLoader['parseAsync']> {
     return new Promise((done, failed) => {
-      const late = (): void => failed(new Error('mesh decoder: no answer'));
+      const late = (): void => failed(new Error('the decoder of meshes gives no answer'));
       const timer = setTimeout(late, 1000 * longestDecodingS);
       super.parseAsync(...of).then(done, failed).finally(() => clearTimeout(timer));
     });

@@ -35,7 +35,7 @@ const cases: [string, unknown, string, keyof Words, RegExp][] = [
   ['damage', new FormatError(own, 'mesh', '3 bytes', '2', 'I08'), own, 'unreadable', /I08 is a rule of/],
   ['another file', new FormatError(own, 'byte 9', 'the file that reading began with',
     'another ETag: it was replaced, open it anew'), own, 'unreadable', /same ETag/],
-  ['decoders that a page forbids', new Error('mesh decoder: no answer'), own, 'unreadable',
+  ['decoders that a page forbids', new Error('the decoder of meshes gives no answer'), own, 'unreadable',
     /Content-Security-Policy.*wasm-unsafe-eval/],
   ['no WebGL', new Error('Error creating WebGL context.'), own, 'no3d', /^$/],
   ['a mistake of ours', new TypeError('x is undefined'), own, 'unreadable', /^$/],
