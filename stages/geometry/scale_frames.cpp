@@ -169,13 +169,15 @@ void Fit::put_on_face(Sample& sample) const {
 
 void Fit::take_samples(const std::vector<Triangle>& finest, const RunContext& context) {
   const std::vector<double> area = wedge_areas(mesh_, finest);
-  for (std::uint32_t w = 0; w < area.size(); ++w)
-    if (area[w] > 0 && place(w) != kNoIndex) samples_.push_back({w, kNoIndex, {}, area[w]});
-  const std::size_t every = samples_.size() / (kSamplesPerNormal * normals_.size() + 1) + 1;
+  const auto stays = [&](std::uint32_t w) { return area[w] > 0 && place(w) != kNoIndex; };
   std::size_t count = 0;
-  for (std::size_t i = 0; i < samples_.size(); i += every) samples_[count++] = samples_[i];
-  samples_.resize(count);
-  parallel_each(context, count, 4096, [&](std::size_t i) { put_on_face(samples_[i]); });
+  for (std::uint32_t w = 0; w < area.size(); ++w) count += stays(w) ? 1 : 0;
+  const std::size_t every = count / (kSamplesPerNormal * normals_.size() + 1) + 1;
+  samples_.reserve(count / every + 1);
+  count = 0;
+  for (std::uint32_t w = 0; w < area.size(); ++w)
+    if (stays(w) && count++ % every == 0) samples_.push_back({w, kNoIndex, {}, area[w]});
+  parallel_each(context, samples_.size(), 4096, [&](std::size_t i) { put_on_face(samples_[i]); });
 }
 
 ScaleFrames Fit::frames() const {

@@ -3,8 +3,8 @@
 // backwards these are the splits.
 #include "stages/scales/vertex_split.h"
 
+#include <algorithm>
 #include <numeric>
-#include <ranges>
 
 namespace texmesh {
 namespace {
@@ -326,8 +326,9 @@ class CollapseReplay {
   /// Of the faces there are; the point has none afterwards.
   void gather_corners(std::uint32_t u) {
     gathered_.clear();
-    for (const std::uint32_t c : corners_.at(u) | std::views::reverse)
+    for (const std::uint32_t c : corners_.at(u))
       if (faces_[c / 3].alive) gathered_.push_back(c);
+    std::ranges::reverse(gathered_);
     corners_.clear(u);
   }
 
