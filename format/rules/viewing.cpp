@@ -105,6 +105,12 @@ int scale_at(std::span<const ManifestStep> steps, double displayed_px) {
   return steps.empty() ? 0 : steps.back().scale;
 }
 
+int finest_shown(std::span<const ManifestScale> scales, double displayed_px) {
+  for (const ManifestScale& s : scales)
+    if (s.triangles * kLeastTrianglePx2 <= displayed_px * displayed_px) return s.scale;
+  return scales.empty() ? 0 : scales.back().scale;
+}
+
 PixelError pixel_error(const Manifest& manifest, const ManifestScale& scale, double displayed_px) {
   if (scale.scale == 0 || !(manifest.object_height > 0)) return {};
   const double px_per_unit = displayed_px / manifest.object_height;

@@ -37,6 +37,11 @@ inline constexpr double kFirstDistancePx = 1024, kDistanceStep = 1.2;
 std::vector<ManifestStep> step_function(std::span<const ManifestScale> scales, StepRule rule);
 /// The scale of the first step that reaches this height.
 int scale_at(std::span<const ManifestStep> steps, double displayed_px);
+/// Square pixels that a triangle must have on average to show, of the square of the displayed height.
+inline constexpr double kLeastTrianglePx2 = 1;
+/// The finest scale whose triangles show at a displayed height, however much the step function calls enough;
+/// the coarsest where those of none do.
+int finest_shown(std::span<const ManifestScale> scales, double displayed_px);
 
 /// How far a scale's surface is from S_0's on screen, in px at most (a distance seen from the side). `max` is
 /// the largest of some thousand sampled distances, never less than p95, which comes from samples of its own.

@@ -10,6 +10,8 @@ constexpr double kWorthwhileFlip = 1e-4;  // a coarser scale must look better, n
 // Where a picture is so many times as far off as its bytes could show, textures are chosen again for so much
 // of the bytes.
 constexpr double kFarFromPlanned = 1.05, kFewerBytes = 0.7;
+// A scale finer than the rule's takes the time that is left where its picture is at most so far off.
+constexpr double kFinerPays = 0.9;
 
 /// Of the textures' rungs in the plan.
 void rate(PackageReader& package, double displayed_px, const FragmentList& list, DeliveryPlan& plan) {
@@ -244,6 +246,41 @@ DeliveryPlan plan_at_scale(TextureLoss& loss, const DeliveryRequest& request, in
   return plan;
 }
 
+/// The scale of finest .. end - 1 that looks best in the time, if it looks better than `best` does: of a scale
+/// that is enough for the display by much.
+void take_scale(TextureLoss& loss, const DeliveryRequest& request, int finest, int end,
+                std::optional<DeliveryPlan>& best) {
+  bool is_enough = best.has_value();
+  for (const ManifestScale& s : loss.package().manifest().scales) {
+    if (s.scale < finest || s.scale >= end) continue;
+    // A mesh that comes too late is no picture in the time.
+    const bool needed = !best || best->mesh_s >= request.time_limit_s;
+    const double most = needed ? std::numeric_limits<double>::infinity()
+                        : is_enough ? kFinerPays * best->flip
+                                    : best->flip - kWorthwhileFlip;
+    if (picture_flip(loss.package().quality(), request.displayed_px, s.scale, {}) >= most) continue;
+    DeliveryPlan plan = plan_at_scale(loss, request, s.scale);
+    if (!needed && (plan.flip >= most || plan.mesh_s >= request.time_limit_s)) continue;
+    best = std::move(plan);
+    is_enough = false;
+  }
+}
+
+/// Mesh and textures. A scale finer than the one that is enough is looked at where textures are not all that
+/// is off.
+std::optional<DeliveryPlan> scale_in_time(TextureLoss& loss, const DeliveryRequest& request, int enough,
+                                          bool only) {
+  const std::vector<ManifestScale>& scales = loss.package().manifest().scales;
+  std::optional<DeliveryPlan> best;
+  take_scale(loss, request, enough, only ? enough + 1 : scales.back().scale + 1, best);
+  const bool by_pictures = !only && request.rule == StepRule::kFlip && !(request.jnd > 0);
+  if (by_pictures && best && best->scale == enough && best->texture_flip < kFinerPays * best->flip) {
+    const int finest = finest_shown(scales, request.displayed_px);
+    take_scale(loss, request, scale_within(scales, finest, request.memory_bytes), enough, best);
+  }
+  return best;
+}
+
 /// What fits, and of that what looks best; where nothing fits, what takes the fewest bytes.
 void take_better(DeliveryPlan plan, std::uint64_t bytes, std::optional<DeliveryPlan>& best) {
   const bool fits = plan.bytes() <= bytes, best_fits = best && best->bytes() <= bytes;
@@ -339,19 +376,9 @@ DeliveryPlan plan_delivery(PackageReader& package, const DeliveryRequest& reques
   const int asked = wanted_scale(package, request);
   const int wanted = only ? asked : scale_within(m.scales, asked, request.memory_bytes);
   TextureLoss loss(package, request.displayed_px);
-  DeliveryPlan best;
-  bool first = true;
-  for (const ManifestScale& s : m.scales) {
-    if (s.scale < wanted || (only && s.scale != wanted)) continue;
-    // A mesh that comes too late is no picture in the time.
-    const bool needed = first || best.mesh_s >= request.time_limit_s;
-    const double most = best.flip - kWorthwhileFlip;
-    if (!needed && picture_flip(package.quality(), request.displayed_px, s.scale, {}) >= most) continue;
-    DeliveryPlan plan = plan_at_scale(loss, request, s.scale);
-    if (needed || plan.flip < most) best = std::move(plan);
-    first = false;
-  }
-  if (first) package.scale_index(wanted);  // says which there are
+  std::optional<DeliveryPlan> chosen = scale_in_time(loss, request, wanted, only);
+  if (!chosen) package.scale_index(wanted);  // says which there are
+  DeliveryPlan& best = *chosen;
   for (std::size_t k = 0; k < m.proxies.size() && !only; ++k) {
     if (!proxy_fits(m, request, k)) continue;
     DeliveryPlan plan = timed_plan_of_proxy(m, request, k);
@@ -362,6 +389,9 @@ DeliveryPlan plan_delivery(PackageReader& package, const DeliveryRequest& reques
   if (best.proxy)
     best.warnings.push_back("S_" + std::to_string(wanted) +
                             " would suit the display, but in this time a proxy looks better");
+  else if (best.scale < wanted)
+    best.warnings.push_back("S_" + std::to_string(wanted) + " would do for the display, but time is left for S_" +
+                            std::to_string(best.scale) + ", which looks better");
   else if (best.scale != wanted)
     best.warnings.push_back("S_" + std::to_string(wanted) + " would suit the display, but in this time S_" +
                             std::to_string(best.scale) + " leaves more for the texture and looks better");

@@ -50,7 +50,7 @@ void add_fragment(const PlaneTables& t, const TextureLoss::Plane& losses, const 
 std::pair<double, double> quality_limits(const PlaneTables& t, std::size_t row, const ListOptions& options) {
   if (!options.thesis) return {options.quality_low, options.quality_high};
   const auto middle = static_cast<double>(t.quality[row]), width = static_cast<double>(t.quality_width);
-  return {std::max(options.quality_low, middle - width), std::min(options.quality_high, middle + width)};
+  return {std::max(options.quality_low, middle - width), std::min(kHighestPrinted, middle + width)};
 }
 
 /// F-bar, the fragment nearest to Gamma, is sent at Q_i itself.

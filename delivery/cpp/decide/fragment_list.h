@@ -24,16 +24,19 @@ struct FragmentList {
   PerGroup preview_loss{};                // of the fragments left out, as the preview shows them, unweighted
 };
 
+/// Quality of lists as printed, at most.
+inline constexpr double kHighestPrinted = 97;
+
 struct ListOptions {
   int scale = 0;                              // number of a scale of the package
   double displayed_px = 1000;                 // > 0: height of the object
   double gamma = -1;                          // of q_i(x, y); -1 = the mean of eta
-  double quality_low = 5, quality_high = 97;  // limits, see HtcOptions::hard_limits
+  double quality_low = 5, quality_high = 100;  // limits, see HtcOptions::hard_limits
   /// > 0: what a group's losses weigh beside the others', see TextureBudget.
   PerGroup group_weights{1, 1, 1};
   // true: chapter 4's list as printed, for Policy::kThesis. Every stored fragment is in the list, whatever it
   // saves; eta is that of (3.1), or VQP where the tables go by it, less Gamma; F-bar, whose eta is nearest
-  // Gamma, gets Q_i; the limits are Q_i - dQ and Q_i + dQ within quality_low and quality_high.
+  // Gamma, gets Q_i; the limits are Q_i - dQ and Q_i + dQ within quality_low and kHighestPrinted.
   bool thesis = false;
 };
 FragmentList fragment_list(PackageReader& package, const std::vector<PlaneChoice>& planes,

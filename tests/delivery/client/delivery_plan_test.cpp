@@ -143,6 +143,21 @@ TEST(DeliveryPlan, ASlowLinkShowsAProxyWhereScalesComeTooLate) {
   EXPECT_EQ(plan_delivery(package, request(512, 5e3)).proxy, 0u);  // late itself, but nothing comes sooner
 }
 
+TEST(DeliveryPlan, TimeThatIsLeftGoesIntoAFinerScale) {
+  PackageReader package = open_package(Proxies::kNone);
+  const auto scale = [&](const DeliveryRequest& r) { return plan_delivery(package, r).scale; };
+  const DeliveryRequest fast = request(300, 1e6);
+  EXPECT_EQ(wanted_scale(package, fast), 4) << "it is enough for the display";
+  EXPECT_EQ(scale(fast), 0);
+  EXPECT_NE(scale(request(300, 3e4)), 0) << "its mesh comes too late";
+  DeliveryRequest other = fast;
+  other.rule = StepRule::kJnd;
+  EXPECT_EQ(scale(other), wanted_scale(package, other)) << "another rule";
+  other = fast;
+  other.memory_bytes = 1;
+  EXPECT_EQ(scale(other), 9) << "no memory for it";
+}
+
 TEST(DeliveryPlan, AProxyThatLooksWorseIsNotShown) {
   PackageReader package = open_package(Proxies::kBad);
   for (const double px : {60.0, 512.0, 3000.0}) {

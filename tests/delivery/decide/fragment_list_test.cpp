@@ -72,6 +72,20 @@ TEST(FragmentList, OffersAddUpToWhatTheGroupLoses) {
       << "weights change what is bought, not what is lost";
 }
 
+TEST(FragmentList, OnlyPrintedListsLeaveTheHighestRungs) {
+  testing::PackageParts parts = testing::make_package_parts();
+  std::vector<std::uint8_t>& quality = parts.tables.planes[0].rung_quality;
+  parts.textures[0].rung_quality.back() = 100;
+  quality.back() = 100;
+  PackageReader package(open_container(memory_source(parts.build())));
+  ListOptions options;
+  for (const FragmentOffer& f : fragment_list(package, full_size(package), options).offers)
+    EXPECT_EQ(f.high_rung, quality.size() - 1) << "it may be the source's own";
+  options.thesis = true;
+  for (const FragmentOffer& f : fragment_list(package, full_size(package), options).offers)
+    EXPECT_LT(f.high_rung, quality.size() - 1);
+}
+
 TEST(FragmentList, TakesTheRowOfTheScalesNumber) {
   PackageReader package = open_with({0.5f, 0.5f, 0.5f, 0});
   ListOptions options;

@@ -10,7 +10,7 @@ import { beyondStart, proxyBytesBeyondStart, proxyLoss, servingProxy } from './p
 import { proxyStep } from './proxy_steps';
 import { InTime, type InTimeRequest, choiceInTime } from './scale_choice';
 import { everyGroup } from './texture_loss';
-import { StepRule, selectScale } from './viewing';
+import { StepRule, finestShown, selectScale } from './viewing';
 
 /** How somebody looks at the object, and over which link. */
 export interface DeliveryRequest {
@@ -136,8 +136,10 @@ export function planDelivery(data: PackageData, request: DeliveryRequest): Deliv
   }
   const asked = wantedScale(manifest, request);
   const wanted = only ? asked : scaleWithin(manifest.scales, asked, memoryBytes);
+  const finest = !only && rule === 'flip'
+    ? scaleWithin(manifest.scales, finestShown(manifest.scales, displayedPx), memoryBytes) : undefined;
   const steps = choiceInTime(data, {
-    displayedPx, wanted, only, textures, memoryBytes, connections: link.connections,
+    displayedPx, wanted, finest, only, textures, memoryBytes, connections: link.connections,
     afterMesh: (scale) => {
       const { moved, fromS, meshS } = timesOf(manifest, request, scale);
       // Where the first request has brought all, that request shows the throughput.

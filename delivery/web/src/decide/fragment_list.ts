@@ -40,7 +40,7 @@ export interface ListOptions {
 }
 /** S_0 at 1000 px, the mean of eta, the qualities of delivery/cpp. */
 export const defaultListOptions: ListOptions = { scale: 0, displayedPx: 1000, gamma: -1, qualityLow: 5,
-  qualityHigh: 97, groupWeights: everyGroup(1) };
+  qualityHigh: 100, groupWeights: everyGroup(1) };
 
 /** `surface`: of the plane's group. */
 function addPlane(loss: TextureLoss, plane: number, surface: number, options: ListOptions, list: FragmentList,

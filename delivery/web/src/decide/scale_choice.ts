@@ -1,4 +1,4 @@
-import { farFromPlanned, fewerBytes, worthwhileFlip } from '../format/shared_numbers';
+import { farFromPlanned, fewerBytes, finerPays, worthwhileFlip } from '../format/shared_numbers';
 import { PackageData } from '../format/tables';
 import { FragmentList, lossesOf } from './fragment_list';
 import { type BytesOf, planesWithin } from './gpu_memory';
@@ -25,8 +25,10 @@ export interface InTime extends Simulated {
 /** Display, scales and link that a choice is made for. */
 export interface InTimeRequest {
   displayedPx: number;
-  /** The finest scale that is worth showing. */
+  /** The scale that is enough. */
   wanted: number;
+  /** A finer one takes its place, up to this one, where time is left and the picture much better; left out: none. */
+  finest?: number;
   /** Only this one. */
   only?: boolean;
   connections: number;
@@ -93,22 +95,38 @@ function* texturesInTime(loss: TextureLoss, request: InTimeRequest, scale: numbe
 }
 
 /**
- * The wanted scale, or a coarser one where a simulation of both shows a better picture in the time or where
- * the wanted mesh comes too late; with the textures that go with it: delivery/cpp/client/delivery_plan.h. A
- * generator, so that a page can breathe between its steps. undefined: the package has no such scale.
+ * The scale of finest .. end - 1 that looks best in the time, if it looks better than `enough` does: of a
+ * scale that is enough for the display by much.
+ */
+function* betterScale(loss: TextureLoss, request: InTimeRequest, finest: number, end: number,
+    enough?: InTime): Generator<void, InTime | undefined> {
+  const { data: { manifest, quality }, displayedPx } = loss;
+  let best = enough;
+  for (const { scale } of manifest.scales) {
+    if (scale < finest || scale >= end) continue;
+    // A mesh that comes too late is no picture in the time.
+    const most: number = !best || best.late ? Infinity
+      : best === enough ? finerPays * best.flip : best.flip - worthwhileFlip;
+    // With the source's texels.
+    if (geometryFlip(quality, displayedPx, scale) >= most) continue;
+    const now = yield* texturesInTime(loss, request, scale);
+    if (most === Infinity || (now.flip < most && !now.late)) best = now;
+  }
+  return best;
+}
+
+/**
+ * The scale that is enough, or a coarser one where a simulation of both shows a better picture in the time or
+ * where the mesh comes too late, or a finer one where time is left; with the textures that go with it:
+ * delivery/cpp/client/delivery_plan.h. A generator, so that a page can breathe between its steps. undefined:
+ * the package has no such scale.
  */
 export function* choiceInTime(data: PackageData,
     request: InTimeRequest): Generator<void, InTime | undefined> {
+  const { wanted, only, finest = wanted } = request;
   const loss = new TextureLoss(data, request.displayedPx);
-  let best: InTime | undefined;
-  for (const { scale } of data.manifest.scales) {
-    if (scale < request.wanted || (request.only && scale !== request.wanted)) continue;
-    // A mesh that comes too late is no picture in the time.
-    const most: number = !best || best.late ? Infinity : best.flip - worthwhileFlip;
-    // With the source's texels.
-    if (geometryFlip(data.quality, request.displayedPx, scale) >= most) continue;
-    const now = yield* texturesInTime(loss, request, scale);
-    if (now.flip < most) best = now;
-  }
-  return best;
+  const best = yield* betterScale(loss, request, wanted, only ? wanted + 1 : Infinity);
+  // Where textures are not all that is off.
+  return best?.scale === wanted && best.textureFlip < finerPays * best.flip
+    ? yield* betterScale(loss, request, finest, wanted, best) : best;
 }

@@ -1,4 +1,4 @@
-import { gammaBisections } from '../format/shared_numbers';
+import { gammaBisections, highestPrinted } from '../format/shared_numbers';
 import type { PackageData } from '../format/tables';
 import { transferRate } from '../http/throughput';
 import { qualityOf } from './allocation';
@@ -38,12 +38,12 @@ export function gammaForBytes(data: PackageData, planes: readonly PlaneChoice[],
 
 /** All fragments as printed: etas from Gamma, limits Q_i - dQ and Q_i + dQ, and F-bar (at Gamma) at Q_i. */
 function asPrintedList(data: PackageData, { offers, fragments }: FragmentList,
-    { scale, gamma, qualityLow, qualityHigh }: ListOptions): void {
+    { scale, gamma, qualityLow }: ListOptions): void {
   const row = data.manifest.scales.findIndex((s) => s.scale === scale);
   offers.forEach((offer, i) => {
     const { quality: { [row]: middle }, qualityWidth, rungQuality } = tablesOf(data, fragments[i].plane);
     const [low, high] = [Math.max(qualityLow, middle - qualityWidth),
-      Math.min(qualityHigh, middle + qualityWidth)];
+      Math.min(highestPrinted, middle + qualityWidth)];
     offer.eta -= gamma;
     offer.highRung = Math.max(rungQuality.filter((q) => q <= high).length - 1, 0);
     offer.lowRung = Math.min(rungQuality.filter((q) => q < low).length, rungQuality.length - 1,

@@ -1,6 +1,6 @@
 import { anyDisplayPx } from '../format/layout';
 import type { Manifest, ManifestScale, ManifestStep } from '../format/manifest';
-import { apart, belowAny, distanceStep, firstDistancePx } from '../format/shared_numbers';
+import { apart, belowAny, distanceStep, firstDistancePx, leastTrianglePx2 } from '../format/shared_numbers';
 import { cos, pi, sin } from './portable_math';
 
 // From how an object is looked at to the scale that is enough: format/rules/viewing.h. Lengths on screen are
@@ -65,6 +65,12 @@ export function stepFunction(scales: readonly ManifestScale[], rule: StepRule): 
 export function scaleAt(steps: readonly ManifestStep[], displayedPx: number): number {
   for (const step of steps) if (displayedPx <= step.upToPx) return step.scale;
   return steps.length === 0 ? 0 : steps[steps.length - 1].scale;
+}
+
+/** The finest scale whose triangles show at a displayed height, however much the step function calls enough. */
+export function finestShown(scales: readonly ManifestScale[], displayedPx: number): number {
+  const shown = scales.find((s) => s.triangles * leastTrianglePx2 <= displayedPx * displayedPx);
+  return (shown ?? scales[scales.length - 1])?.scale ?? 0;
 }
 
 /** The shape that the visible part of an object makes (thesis 7.2, Fig. 7.5). */

@@ -137,6 +137,11 @@ export const meshShare = 0.5; // a mesh may take so much where a coarser one tak
 export const worthwhileFlip = 0.0001; // a coarser scale must look better, not only as good
 export const farFromPlanned = 1.05;
 export const fewerBytes = 0.7;
+export const finerPays = 0.9;
+/** Square pixels that a triangle must have on average to show, of the square of the displayed height. */
+export const leastTrianglePx2 = 1;
+/** Quality of lists as printed, at most. */
+export const highestPrinted = 97;
 export const leastRequestS = 0.006; // a request is worth at least so much of the link
 export const hiddenRtts = 0.6; // that six connections at once hide
 export const leastDecisions = 48;

@@ -17,8 +17,8 @@ export class ShownScale {
   shown = noScale;
   wanted = noScale;
   readonly proxy: ShownProxy;
-  /** Gives the scale that is enough at a displayed height; set once the documents are there. */
-  scaleFor?: (heightPx: number, part: VisiblePart | undefined) => number;
+  /** Gives the scale that is enough at a displayed height, or the finest; set once the documents are there. */
+  scaleFor?: (heightPx: number, part: VisiblePart | undefined, finest?: boolean) => number;
   private retryScale_ = noScale;
   private retryTimer_: ReturnType<typeof setTimeout> | undefined;
   private retryS_ = retryScaleS.first;
@@ -101,12 +101,12 @@ export class ShownScale {
     this.place_();
     this.proxy.dispose();
   }
-  /** The scale that the view asks for, by a little more than the last time. */
+  /** The scale that the view asks for, by a little more than the last time. A finer one stays while it shows. */
   private scaleForView_(): number {
     const { override, view: { display } } = this.load_;
-    const at = (factor: number): number =>
-      override.scale ?? this.scaleFor!(display.heightPx * factor, display.part);
+    const at = (factor: number, finest = false): number =>
+      override.scale ?? this.scaleFor!(display.heightPx * factor, display.part, finest);
     if (override.scale !== undefined || at(1 / hysteresis) < this.wanted) return at(1);
-    return Math.max(at(hysteresis), this.wanted);
+    return at(hysteresis, true) <= this.wanted ? this.wanted : Math.max(at(hysteresis), this.wanted);
   }
 }

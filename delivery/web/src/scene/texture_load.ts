@@ -7,7 +7,7 @@ import { proxyStep } from '../decide/proxy_steps';
 import { throughputOf } from '../decide/request_groups';
 import { choiceInTime } from '../decide/scale_choice';
 import { type PlaneChoice, pictureFlip } from '../decide/texture_loss';
-import { type VisiblePart, selectScale } from '../decide/viewing';
+import { type VisiblePart, finestShown, selectScale } from '../decide/viewing';
 import { throwIfAborted } from '../format/errors';
 import { worthwhileFlip } from '../format/shared_numbers';
 import { nextTurn, nowS, sleepS } from '../http/requests';
@@ -97,7 +97,7 @@ export class TextureLoad {
       private readonly source_: ScaleSource, private readonly fetching_: FragmentFetch) {
     this.planes_ = fetching_.planes;
     this.inTime_ = new FetchInTime(load_, fetching_);
-    scale_.scaleFor = (heightPx, part) => this.scaleFor_(heightPx, part);
+    scale_.scaleFor = (...of) => this.scaleFor_(...of);
     if (scale_.held) load_.events.on('fragment', () => this.releaseInTime_());
   }
 
@@ -220,10 +220,11 @@ export class TextureLoad {
   private timer_(share: number): Promise<void> {
     return sleepS(clamp(share * this.inTime_.leftS(), 0, longestTimerS));
   }
-  /** The scale that is enough at a displayed height. */
-  private scaleFor_(heightPx: number, part: VisiblePart | undefined): number {
-    const { options: { rule }, memoryBytes, reader: { manifest } } = this.load_;
-    const scale = selectScale(manifest, heightPx, part, rule);
+  /** The scale that is enough at a displayed height, or the finest that its pictures may ask for. */
+  private scaleFor_(heightPx: number, part: VisiblePart | undefined, finest = false): number {
+    const { options: { rule = 'flip' }, memoryBytes, reader: { manifest } } = this.load_;
+    const scale = finest && rule === 'flip' && !this.alike_ ? finestShown(manifest.scales, heightPx)
+      : selectScale(manifest, heightPx, part, rule);
     return scaleWithin(manifest.scales, this.alike_?.(scale) ?? scale, memoryBytes);
   }
   /** Scale and planes for the display, or those that look best in the time. */
@@ -246,7 +247,7 @@ export class TextureLoad {
       return textures;
     });
     const steps = choiceInTime(planes.data, {
-      displayedPx: display.heightPx, wanted, only: override.scale !== undefined || !!printed, textures: spend,
+      displayedPx: display.heightPx, wanted, finest: this.scaleFor_(display.heightPx, display.part, true), only: override.scale !== undefined || !!printed, textures: spend,
       connections: client.options.connections,
       memoryBytes: load.memoryBytes, ways: planes.ways,
       afterMesh: (scale) => ({ plan: this.inTime_.planOptions(limitAfterMeshS(scale)), linkBytesS: beta0 }),

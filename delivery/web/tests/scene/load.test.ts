@@ -1,6 +1,7 @@
 import { type BufferGeometry, type EventDispatcher, type Material, type Mesh, PerspectiveCamera,
   SphereGeometry } from 'three';
 import { describe, expect, it } from 'vitest';
+import { stepFunction } from '../../src/decide/viewing';
 import { InputError, PackageReader } from '../../src/reader';
 import { fakeServer } from '../support/fake_server';
 import { golden } from '../support/files';
@@ -81,12 +82,12 @@ describe('a load', () => {
     }
   });
   it('keeps its scale when the display changes by less than a tenth in the timed part', async () => {
-    const step = reader.manifest.steps[0];
-    const finer = reader.manifest.steps[1];
+    const rule = 'jnd'; // by pictures a finer scale may come
+    const [step, finer] = stepFunction(reader.manifest.scales, rule);
     for (const [from, to, scale] of [[0.98, 1.05, step.scale], [0.98, 1.15, finer.scale],
           [1.02, 0.95, finer.scale], [1.02, 0.85, step.scale]]) {
       let px = from * step.upToPx;
-      const l = await loading(url, fakeServer(files), { time: 3, display: () => px });
+      const l = await loading(url, fakeServer(files), { time: 3, rule, display: () => px });
       const taken: number[] = [];
       l.model.on('decision', () => {
         if (taken.length > 0) return;
@@ -101,6 +102,20 @@ describe('a load', () => {
       expect([from, to, l.model.state.wantedScale]).toEqual([from, to, scale]);
       l.dispose();
     }
+  });
+  it('takes a finer scale where time is left, and keeps it as long as its triangles show', async () => {
+    const { scales, steps: [{ scale, upToPx }] } = reader.manifest;
+    let px = upToPx;
+    const l = await loading(url, fakeServer(files), { time: 3, display: () => px });
+    await l.model.done;
+    await l.model.refine();
+    expect(l.model.state.wantedScale).toBe(0);
+    for (const [now, shown] of [[Math.sqrt(scales[0].triangles), 0], [1, scale]]) {
+      px = now;
+      l.model.update();
+      expect(l.model.state.wantedScale).toBe(shown);
+    }
+    l.dispose();
   });
   it('does not ask again and again for what cannot be had', async () => {
     const server =
