@@ -62,6 +62,23 @@ std::string wrapped(const std::string& text, std::size_t column, std::size_t ind
   return out + "\n";
 }
 
+/// One line, broken where it is wider than `width`; what follows stands beneath its last column, or item.
+std::string broken_line(const std::string& line, std::size_t width) {
+  if (line.size() <= width) return line;
+  if (line.find_first_not_of(" -") == std::string::npos) return line.substr(0, width);  // beneath a heading
+  const std::size_t gap = line.rfind("  ");
+  std::size_t indent = gap != std::string::npos ? gap + 2 : line.starts_with("- ") ? 2 : 0;
+  if (indent > width / 2) indent = 4;
+  std::string out = line;
+  for (std::size_t begin = 0; begin + width < out.size();) {
+    const std::size_t blank = out.rfind(' ', begin + width);
+    if (blank == std::string::npos || blank <= begin + indent) break;  // a word that is wider
+    out.replace(blank, 1, "\n" + std::string(indent, ' '));
+    begin = blank + 1;
+  }
+  return out;
+}
+
 std::string two_columns(const std::string& left, const std::string& text) {
   std::string out = "  " + left;
   if (out.size() + 2 > kTextColumn) out += "\n";
@@ -89,27 +106,39 @@ std::string option_names(const CLI::Option& o, bool short_only) {
   return names;
 }
 
-/// What the option does, the words that its value is one of, its default, what it excludes.
+/// What the option does, the words that its value is one of, its default.
 std::string option_description(const CLI::Option& o, const HelpNotes& notes) {
   std::string text = o.get_description();
   if (const auto it = notes.choices.find(&o); it != notes.choices.end()) text += " " + it->second;
   if (notes.with_default.contains(&o)) text += " (default " + o.get_default_str() + ")";
-  for (const CLI::Option* other : o.get_excludes()) text += " (not with " + option_names(*other, false) + ")";
   return text;
 }
 
-std::string option_line(const CLI::Option& o, const Everyday* everyday, const HelpNotes& notes) {
+/// " (not with --bytes, --lods)": those of `shown` that stand before the option, so that a pair is told once.
+std::string excluded(const CLI::Option& o, const std::vector<const CLI::Option*>& shown) {
+  std::string names;
+  for (const CLI::Option* other : shown)
+    if (other == &o)
+      break;
+    else if (o.get_excludes().contains(const_cast<CLI::Option*>(other)))
+      names += (names.empty() ? "" : ", ") + option_names(*other, false);
+  return names.empty() ? "" : " (not with " + names + ")";
+}
+
+std::string option_line(const CLI::Option& o, const Everyday* everyday, const HelpNotes& notes,
+                        const std::vector<const CLI::Option*>& shown = {}) {
   std::string left = option_names(o, everyday != nullptr);
   if (!o.get_positional() && o.get_type_size() != 0 && !o.get_type_name().empty())
     left += " " + o.get_type_name();
   const bool own_text = everyday == nullptr || everyday->text.empty();
-  return two_columns(left, own_text ? option_description(o, notes) : everyday->text);
+  return two_columns(left, (own_text ? option_description(o, notes) : everyday->text) + excluded(o, shown));
 }
 
 /// Groups in the order in which their first options were added.
 std::string option_groups(const CLI::App& app, bool full, const HelpNotes& notes) {
   std::vector<std::string> titles;
   std::map<std::string, std::string> lines;
+  std::vector<const CLI::Option*> shown;
   for (const CLI::Option* o : app.get_options()) {
     const auto found = notes.everyday.find(o);
     const Everyday* everyday = full || found == notes.everyday.end() ? nullptr : &found->second;
@@ -118,7 +147,8 @@ std::string option_groups(const CLI::App& app, bool full, const HelpNotes& notes
                               : everyday != nullptr ? everyday->title
                                                     : o->get_group();
     if (!lines.contains(title)) titles.push_back(title);
-    lines[title] += option_line(*o, everyday, notes);
+    lines[title] += option_line(*o, everyday, notes, shown);
+    shown.push_back(o);
   }
   std::string out;
   for (const char* first : {"Arguments", "Options"})
@@ -290,11 +320,12 @@ std::string roff(const std::string& text) {
   return lines;
 }
 
-std::string roff_option(const CLI::Option& option, const HelpNotes& notes) {
+std::string roff_option(const CLI::Option& option, const CLI::App& app, const HelpNotes& notes) {
   std::string left =
       option.get_positional() ? option.get_name(true, false) : in_a_row(option_words(option), ", ");
   if (!option.get_positional() && !option.get_type_name().empty()) left += " " + option.get_type_name();
-  return ".TP\n.B " + roff(left) + roff(option_description(option, notes));
+  return ".TP\n.B " + roff(left) +
+         roff(option_description(option, notes) + excluded(option, app.get_options()));
 }
 
 /// Lines as they are: of examples, and of notes that begin with a blank.
@@ -310,7 +341,7 @@ std::string roff_notes(const std::string& text) {
 
 std::string roff_command(const NamedCommand& command, const HelpNotes& notes) {
   std::string out = ".SS " + roff(command.path) + roff(command.app->get_description());
-  for (const CLI::Option* o : command.app->get_options()) out += roff_option(*o, notes);
+  for (const CLI::Option* o : command.app->get_options()) out += roff_option(*o, *command.app, notes);
   if (const std::string lines = note_of(notes.examples, command.app); !lines.empty())
     out += ".PP\nExamples:\n.PP\n" + roff_lines(lines);
   return out + roff_notes(note_of(notes.notes, command.app));
@@ -419,7 +450,7 @@ std::string manual_page(const CLI::App& program, const HelpNotes& notes) {
   out += roff_notes(note_of(notes.notes, &program)) + ".PP\nExamples:\n.PP\n" +
          roff_lines(note_of(notes.examples, &program));
   out += ".SH OPTIONS\n";
-  for (const CLI::Option* o : program.get_options()) out += roff_option(*o, notes);
+  for (const CLI::Option* o : program.get_options()) out += roff_option(*o, program, notes);
   out += ".SH COMMANDS\n";
   const std::vector<NamedCommand> commands = commands_beneath(program, program.get_name());
   for (auto c = commands.begin() + 1; c != commands.end(); ++c) out += roff_command(*c, notes);
@@ -479,6 +510,17 @@ const char* default_value_name() {
 }
 
 }  // namespace
+
+std::string wrapped_lines(const std::string& text, std::size_t width) {
+  std::istringstream lines(text);
+  std::string out;
+  for (std::string line; std::getline(lines, line);) out += broken_line(line, width) + "\n";
+  return out;
+}
+
+std::string for_terminal(const std::string& text) {
+  return ::isatty(STDOUT_FILENO) == 1 ? wrapped_lines(text, help_width()) : text;
+}
 
 struct CommandLineState {
   HelpNotes help;

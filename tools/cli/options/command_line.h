@@ -157,6 +157,11 @@ class CommandLine {
   std::unique_ptr<CLI::App> app_;
 };
 
+/// Lines that are wider than `width` go on beneath their last column, or beneath the text of their item.
+std::string wrapped_lines(const std::string& text, std::size_t width);
+/// The text as standard output takes it: wrapped for a terminal, as it is for files and pipes.
+std::string for_terminal(const std::string& text);
+
 /// Runs what gives an exit code. What it throws is printed; the exit code is then that of exit_codes.h: 2 for
 /// a UsageError, 1 for other errors of inputs and files, 3 for mistakes of ours.
 int run_and_print_errors(const std::function<int()>& run);
