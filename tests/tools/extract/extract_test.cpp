@@ -259,6 +259,10 @@ TEST(ExtractModel, AvifFillsTheBytesAndIsReadAgain) {
   EXPECT_LE(e.glb.size(), 6000u);
   ASSERT_FALSE(e.images.empty());
   for (const ExtractedImage& i : e.images) EXPECT_EQ(i.format, FileImage::kAvif);
+  EXPECT_EQ(
+      std::ranges::count_if(e.notes, [](const auto& n) { return n.find("Blender does not") != n.npos; }), 1);
+  r.images = ExtractImages::kWebp;
+  EXPECT_EQ(extract({r}).notes.size() + 1, e.notes.size());
   NoFiles none;
   const Model model = import_package_glb("x.glb", e.glb, none, {}).model;
   ASSERT_EQ(model.images.size(), e.images.size());
