@@ -148,6 +148,8 @@ TEST_F(Collection, AnotherOptionRunsItsStageAndWhatSeesOtherBytes) {
   EXPECT_EQ(ran_in(events({"--rungs", "50", "--title", "Coin"})),
             (std::map<std::string, Stages>{{"a.obj", {"package"}}}));
   const CommandResult explained = compile({"--rungs", "50", "--title", "Vase", "--explain"});
+  EXPECT_NE(explained.errors.find("--title: all 3 packages have this title"), std::string::npos)
+      << explained.errors;
   EXPECT_NE(explained.output.find("runs: package.title \"Coin\" -> \"Vase\""), std::string::npos)
       << explained.output;
   EXPECT_EQ(explained.output.find("runs: "), explained.output.rfind("runs: ")) << explained.output;
