@@ -10,6 +10,7 @@
 #include "stages/image/decode_image.h"
 #include "tests/support/packages.h"
 #include "tools/extract/extract.h"
+#include "tools/extract/usdz/usdz.h"
 
 namespace texmesh::extract_test {
 
@@ -267,6 +268,21 @@ TEST(ExtractModel, AvifFillsTheBytesAndIsReadAgain) {
   const Model model = import_package_glb("x.glb", e.glb, none, {}).model;
   ASSERT_EQ(model.images.size(), e.images.size());
   EXPECT_EQ(model.images[0].width_px, e.images[0].width_px);
+}
+
+/// Its meshes take several times a GLB's bytes, so many GLBs are tried.
+TEST(ExtractModel, AUsdzFitsWhereverThePackageGivesOneOfSoFewBytes) {
+  const auto usdz = [](std::uint64_t bytes) {
+    PackageReader package = open(package_bytes());
+    return std::move(extract_usdz(package, {budget({bytes})}, {}).front());
+  };
+  const Extracted least = usdz(1);
+  EXPECT_FALSE(least.within);
+  for (const double over : {1.0, 1.02, 1.1, 1.3}) {
+    const auto wish = static_cast<std::uint64_t>(over * static_cast<double>(least.glb.size()));
+    const Extracted found = usdz(wish);
+    EXPECT_TRUE(found.within) << over << ": " << found.glb.size() << " of " << wish;
+  }
 }
 
 TEST(ExtractModel, ReportsAreJson) {
