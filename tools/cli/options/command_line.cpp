@@ -3,8 +3,6 @@
 #include "tools/cli/options/command_line.h"
 
 #include <fmt/format.h>
-#include <sys/ioctl.h>
-#include <unistd.h>
 
 #include <CLI/CLI.hpp>
 #include <cstdlib>
@@ -36,54 +34,11 @@ struct HelpNotes {
 
 constexpr std::size_t kTextColumn = 28;
 
-std::size_t help_width() {
-  constexpr int kLeast = 60, kMost = 100;
-  const char* columns = std::getenv("COLUMNS");
-  int width = columns != nullptr ? std::atoi(columns) : 0;
-  if (winsize window{}; width <= 0 && ::ioctl(STDOUT_FILENO, TIOCGWINSZ, &window) == 0) width = window.ws_col;
-  return static_cast<std::size_t>(std::clamp(width > 0 ? width : kMost, kLeast, kMost));
-}
-
-/// `text` after the `column` characters that its first line has already; further lines begin at `indent`.
-std::string wrapped(const std::string& text, std::size_t column, std::size_t indent) {
-  const std::size_t width = help_width();
-  std::istringstream words(text);
-  std::string out;
-  bool first = true;
-  for (std::string word; words >> word; first = false) {
-    if (!first && column + 1 + word.size() > width) {
-      out += "\n" + std::string(indent, ' ');
-      column = indent;
-    } else if (!first) {
-      out += ' ', ++column;
-    }
-    out += word, column += word.size();
-  }
-  return out + "\n";
-}
-
-/// One line, broken where it is wider than `width`; what follows stands beneath its last column, or item.
-std::string broken_line(const std::string& line, std::size_t width) {
-  if (line.size() <= width) return line;
-  if (line.find_first_not_of(" -") == std::string::npos) return line.substr(0, width);  // beneath a heading
-  const std::size_t gap = line.rfind("  ");
-  std::size_t indent = gap != std::string::npos ? gap + 2 : line.starts_with("- ") ? 2 : 0;
-  if (indent > width / 2) indent = 4;
-  std::string out = line;
-  for (std::size_t begin = 0; begin + width < out.size();) {
-    const std::size_t blank = out.rfind(' ', begin + width);
-    if (blank == std::string::npos || blank <= begin + indent) break;  // a word that is wider
-    out.replace(blank, 1, "\n" + std::string(indent, ' '));
-    begin = blank + 1;
-  }
-  return out;
-}
-
 std::string two_columns(const std::string& left, const std::string& text) {
   std::string out = "  " + left;
   if (out.size() + 2 > kTextColumn) out += "\n";
   const std::size_t used = out.back() == '\n' ? 0 : out.size();
-  return out + std::string(kTextColumn - used, ' ') + wrapped(text, kTextColumn, kTextColumn);
+  return out + std::string(kTextColumn - used, ' ') + wrapped_text(text, kTextColumn, kTextColumn);
 }
 
 /// Lines that begin with a blank stay as they are.
@@ -91,7 +46,7 @@ std::string paragraphs(const std::string& text) {
   std::istringstream lines(text);
   std::string out;
   for (std::string line; std::getline(lines, line);)
-    out += line.starts_with(" ") ? line + "\n" : wrapped(line, 0, 0);
+    out += line.starts_with(" ") ? line + "\n" : wrapped_text(line, 0, 0);
   return out;
 }
 
@@ -184,7 +139,7 @@ std::string usage(const CLI::App& app, const std::string& name) {
     if (o->get_positional() && o->get_expected_max() > 1) shown += "...";
     line += o->get_required() ? " " + shown : " [" + shown + "]";
   }
-  return wrapped(line, 0, 4);
+  return wrapped_text(line, 0, 4);
 }
 
 std::string note_of(const std::map<const CLI::App*, std::string>& notes, const CLI::App* app) {
@@ -203,7 +158,7 @@ std::string group_alone(const CLI::App& app, const std::string& name, const Help
 /// columns; COLUMNS, where set, instead of the terminal's; 100 where there is none).
 std::string help_text(const CLI::App& app, const std::string& name, bool full, const HelpNotes& notes) {
   if (!notes.only_group.empty()) return group_alone(app, name, notes);
-  std::string out = wrapped(app.get_description(), 0, 0) + usage(app, name);
+  std::string out = wrapped_text(app.get_description(), 0, 0) + usage(app, name);
   if (const std::string lines = note_of(notes.examples, &app); !lines.empty())
     out += "\nExamples:\n" + paragraphs(lines);
   out += command_groups(app, full, notes) + option_groups(app, full, notes);
@@ -510,17 +465,6 @@ const char* default_value_name() {
 }
 
 }  // namespace
-
-std::string wrapped_lines(const std::string& text, std::size_t width) {
-  std::istringstream lines(text);
-  std::string out;
-  for (std::string line; std::getline(lines, line);) out += broken_line(line, width) + "\n";
-  return out;
-}
-
-std::string for_terminal(const std::string& text) {
-  return ::isatty(STDOUT_FILENO) == 1 ? wrapped_lines(text, help_width()) : text;
-}
 
 struct CommandLineState {
   HelpNotes help;
