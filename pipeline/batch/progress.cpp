@@ -219,9 +219,10 @@ void Progress::cache_event(const std::string& code, const std::string& text) {
 }
 
 void Progress::finished(std::size_t model, const WorkerReport& r, const std::string& output) {
-  ++finished_count_;
+  const bool cancelled = r.result == ModelResult::kCancelled;
+  finished_count_ += !cancelled;
   const auto it = running_.find(model);
-  done_weight_ += models_[model].weight - (it == running_.end() ? 0 : it->second.fraction);
+  if (!cancelled) done_weight_ += models_[model].weight - (it == running_.end() ? 0 : it->second.fraction);
   running_.erase(model);
   if (mode_ == OutputMode::kJson) {
     write_event(ModelFinished{name_of(model), output, r});

@@ -337,6 +337,14 @@ class AtlasChooser {
   Store& store() { return store_; }
   StageKeys keys;  // of the stages that looked
 
+  /// Tells nothing of results that only this model has kept: a run without a cache has none of a cache.
+  StageObserver without_own_hits(const StageObserver& observer) const {
+    if (!observer || &store_ != &memory_) return observer;
+    return [observer](const Stage& stage, StageEvent event, double fraction, double seconds) {
+      if (event != StageEvent::kHit) observer(stage, event, fraction, seconds);
+    };
+  }
+
   /// Tells each stage that runs, and those that do not once.
   StageExplainer explain_once(StageExplainer explainer) {
     if (!explainer) return {};
@@ -385,11 +393,12 @@ class AtlasChooser {
 
 CompileOutcome compile_source(const CompileRequest& request, const CompileOptions& resolved,
                               ModelSource& source, Store& store, const RunContext& context,
-                              const StageObserver& observer) {
+                              const StageObserver& asked_observer) {
   source.open(store, context, true);
   Notes notes;
   AtlasChooser chooser(resolved, source, store, context);
   const StageExplainer explainer = chooser.explain_once(request.explainer);
+  const StageObserver observer = chooser.without_own_hits(asked_observer);
   const CompileOptions options =
       with_archived_notes(chooser.choose(request.earlier_keys, explainer, observer, notes), source, notes);
   ModelGraph graph(source, stage_table(options), options, chooser.store(), context, observer);

@@ -16,7 +16,7 @@
 
 namespace texmesh {
 
-inline constexpr int kImportVersion = 14;
+inline constexpr int kImportVersion = 15;
 
 enum class KdPolicy : std::uint8_t { kIgnore, kMultiply };
 template <>

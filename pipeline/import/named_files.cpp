@@ -1,6 +1,7 @@
 #include "pipeline/import/named_files.h"
 
 #include <algorithm>
+#include <set>
 
 #include "format/container/layout.h"
 #include "pipeline/import/text_scan.h"
@@ -148,12 +149,27 @@ class Finder {
              std::ranges::find(beside_, name) != beside_.end();
     });
     for (const std::string& name : moved)
-      if (read(name)) {
-        warn("moved-file", " is not there; " + quote(name) + ", a file of the same last part, is taken");
-        return true;
-      }
+      if (read(name)) return warn_of_moved();
     found_.looked_for = looked_for;
+    return read_beside();
+  }
+
+  /// Sketchfab's downloads have models in source/, pictures in textures/ beside it.
+  bool read_beside() {
+    std::set<std::string> names;
+    for (const auto* all : {&inside_, &beside_})
+      for (const std::string& name : *all) names.insert(std::string(kTexturesBeside).append(last_part(name)));
+    for (const std::string& name : names) {
+      const std::string looked_for = found_.looked_for;
+      if (read(name)) return warn_of_moved();
+      if (!found_.looked_for.ends_with(')')) found_.looked_for = looked_for;  // it was not refused
+    }
     return false;
+  }
+
+  bool warn_of_moved() {
+    warn("moved-file", " is not there; " + quote(found_.name) + ", a file of the same last part, is taken");
+    return true;
   }
 
   struct Similar {

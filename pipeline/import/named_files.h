@@ -33,9 +33,9 @@ struct NamedFile {
 ///   with the warning "similar-name"; where there is none, the only picture whose ending differs, too, with
 ///   "other-ending".
 /// - Last, the file of the name's last part in the same two folders, or in their folder textures, is taken
-/// with
-///   the warning "moved-file". Each further folder would cost a hostile model with many names a look for
-///   each.
+///   with the warning "moved-file". Each further folder would cost a hostile model with many names a look for
+///   each. Of a model in a folder source, the folder textures beside that is such a folder, too, where the
+///   resolver may read it.
 /// What must not be read counts as missing. InputError when the file is longer than max_bytes.
 NamedFile find_file(const NameInModel& name, Resolver& resolver, std::uint64_t max_bytes, Notes& notes,
                     const std::string& place);

@@ -176,15 +176,40 @@ int FileResolver::open_link(const std::string& uri) {
                     "links that stay within DIR)");
 }
 
+bool FileResolver::is_in_source() {
+  std::error_code ec;
+  if (!own_path_) own_path_ = std::filesystem::canonical(roots_[0], ec);
+  return own_path_->filename() == "source";
+}
+
+int FileResolver::open_beside(const std::string& uri) {
+  namespace fs = std::filesystem;
+  if (!is_in_source()) return -1;
+  const fs::path both = own_path_->parent_path();
+  std::error_code ec;
+  for (std::size_t i = 1; i < roots_.size(); ++i) {
+    const fs::path root = fs::canonical(roots_[i], ec);
+    if (ec || *both.lexically_relative(root).begin() == "..") continue;
+    const Descriptor folder(::open(both.c_str(), O_PATH | O_DIRECTORY | O_CLOEXEC));
+    return folder.get() < 0 ? -1 : open_beneath(folder.get(), uri.substr(3));
+  }
+  if (!fs::is_directory(both / kTexturesBeside.substr(3), ec)) return -1;
+  throw FileRefused(uri, "", kRegularFile,
+                    "a file beside the model's folder: compile the folder of both, or a ZIP archive of it");
+}
+
 /// Opens a uri that has a number; -1 when there is no such file.
 int FileResolver::open_regular(const std::string& uri) {
+  const bool beside = uri.starts_with(kTexturesBeside);
   try {
-    check_relative_name(uri, "", "");
+    check_relative_name(beside ? uri.substr(3) : uri, "", "");
   } catch (const InputError& e) {
     throw FileRefused(uri, "", e.expected(), e.found());
   }
-  const int fd = open_beneath(folder_, uri);
+  errno = ENOENT;  // of open_beside()
+  const int fd = beside ? open_beside(uri) : open_beneath(folder_, uri);
   if (fd >= 0) return fd;
+  if (beside && (errno == ELOOP || errno == EXDEV)) return -1;
   switch (errno) {
     case ENOENT:
     case ENOTDIR:
@@ -201,6 +226,7 @@ int FileResolver::open_regular(const std::string& uri) {
 }
 
 std::optional<Bytes> FileResolver::read(const std::string& uri, std::uint64_t max_bytes) {
+  if (uri.starts_with(kTexturesBeside) && !is_in_source()) return std::nullopt;
   const std::size_t index = number_of(uri);
   try {
     const Descriptor fd(open_regular(uri));

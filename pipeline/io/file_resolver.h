@@ -11,8 +11,9 @@ namespace texmesh {
 /// RESOLVE_NO_MAGICLINKS, or, where the kernel or a sandbox has no openat2, component by component with
 /// O_NOFOLLOW. A symbolic link is followed where it leads, in the end, to a place beneath that folder or one
 /// of `links_within`; the place is then opened in the same way. Regular files only; a FIFO does not block.
-/// The folders themselves may be reached over symbolic links: the user named them, not the model. Not
-/// thread-safe.
+/// The folders themselves may be reached over symbolic links: the user named them, not the model. A model in
+/// a folder `source`, as Sketchfab's downloads have it, finds files of the folder `textures` beside that
+/// (kTexturesBeside) where the folder of both lies beneath one of `links_within`. Not thread-safe.
 class FileResolver : public Resolver {
  public:
   enum class Method : std::uint8_t { kBest, kWalk };  // kWalk: as if there were no openat2
@@ -43,11 +44,14 @@ class FileResolver : public Resolver {
  private:
   int open_beneath(int folder, const std::string& name);
   int open_link(const std::string& uri);
+  int open_beside(const std::string& uri);
+  bool is_in_source();
   int open_regular(const std::string& uri);
   std::size_t number_of(const std::string& uri);
 
   int folder_ = -1;
-  std::vector<std::string> roots_;  // the folder, then those of links
+  std::optional<std::filesystem::path> own_path_;  // of the model's folder, once it was asked for
+  std::vector<std::string> roots_;                 // the folder, then those of links
   bool walk_ = false, failed_for_resources_ = false;
   std::vector<FileRequest> requests_;
   std::map<std::string, std::size_t> index_of_;  // of files

@@ -21,6 +21,9 @@ class Resolver {
   virtual std::vector<std::string> similar(const std::string&) { return {}; }
 };
 
+/// The one folder beside the model's that a resolver may read, see FileResolver: "../textures/bust.png".
+inline constexpr std::string_view kTexturesBeside = "../textures/";
+
 /// What lies under a name must not be read.
 struct FileRefused : InputError {
   using InputError::InputError;

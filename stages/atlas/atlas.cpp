@@ -121,6 +121,13 @@ void add_pages(const ConditionedMesh& mesh, const std::vector<Material>& materia
   }
 }
 
+std::string gain_of(std::size_t charts, std::size_t new_charts) {
+  const std::string found = "a new atlas has " + std::to_string(new_charts) +
+                            (new_charts == 1 ? " chart for " : " charts for ") + std::to_string(charts);
+  if (new_charts < charts) return found + "; coarse scales and coordinates take fewer bytes";
+  return found + ", so it saves nothing: --atlas keep takes fewer bytes";
+}
+
 }  // namespace
 
 ChartedModel chart_model(const ConditionedMesh& mesh, const std::vector<Material>& materials,
@@ -137,13 +144,11 @@ ChartedModel chart_model(const ConditionedMesh& mesh, const std::vector<Material
   ChartedModel out;
   out.mesh = mesh_on_pages(mesh, *pages);
   add_pages(mesh, materials, images, classes, *pages, out, context);
-  add_info(out.notes, kRebuiltAtlasNote, "",
-           "a new atlas has " + std::to_string(pages->chart_count) + " charts for " + std::to_string(charts) +
-               "; coarse scales and coordinates take fewer bytes. " + kLostByRebuilding);
-  if (pages->least_share < kSharpEnough)
+  add_info(out.notes, kRebuiltAtlasNote, "", gain_of(charts, pages->chart_count) + ". " + kLostByRebuilding);
+  if (const int percent = static_cast<int>(100 * pages->least_share); pages->least_share < kSharpEnough)
     add_warning(out.notes, "atlas-blurred", "",
-                "textures show in several places: the new atlas has only " +
-                    std::to_string(static_cast<int>(100 * pages->least_share)) +
+                "textures show in several places: the new atlas has " +
+                    (percent < 1 ? "less than 1" : "only " + std::to_string(percent)) +
                     " % of the texels that the surface has of them; --atlas keep has all");
   return out;
 }

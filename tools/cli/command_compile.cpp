@@ -365,6 +365,10 @@ int run_compile(CompileArguments& args) {
     if (!settings.depfile.empty() && models.models.size() != 1)
       throw InputError("--depfile", "", "one model", std::to_string(models.models.size()) + " models");
     check_reports(models, settings);
+    if (args.options.contains("package.title") && models.models_in_collection > 1)
+      add_warning(models.notes, "one-title", "--title",
+                  "all " + std::to_string(models.models_in_collection) +
+                      " packages have this title; a collection.json gives each its own");
     tell_of_notes(models.notes);
     return models;
   });

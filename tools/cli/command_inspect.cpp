@@ -168,10 +168,11 @@ int run_doctor(const DoctorArguments& args) {
   if (args.json) {
     std::cout << to_json_line(DoctorReport{name, diagnosis, reasons, notes, auto_atlas}) << '\n';
   } else {
-    std::cout << printable(name) << "\n" << atlas_text(diagnosis);
-    if (auto_atlas) std::cout << *auto_atlas << "\n";
-    std::cout << gate_text(results);
-    if (notes) std::cout << "notes: " << notes_words(*notes) << "\n";
+    std::string text = printable(name) + "\n" + atlas_text(diagnosis);
+    if (auto_atlas) text += *auto_atlas + "\n";
+    text += gate_text(results);
+    if (notes) text += "notes: " + notes_words(*notes) + "\n";
+    std::cout << for_terminal(text);
   }
   return reasons.empty() ? kExitOk : kExitDifferent;
 }

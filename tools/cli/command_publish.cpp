@@ -63,6 +63,8 @@ void announce(const ViewArguments& args, const ServedFiles& files, const std::st
     PackageReader package(open_store(args.package));
     package.store().list();  // its end is there
   }
+  if (const std::string links = links_left_out(find_packages(args.package)); !links.empty())
+    std::cerr << "note: " << printable(links) << '\n';
   const ServedFiles files(args.package, viewer_folder(args.viewer));
   ViewServer server(files);
   const int port = server.bind(args.host, args.port);
@@ -276,6 +278,7 @@ int run_site(SiteArguments& args) {
   for (const std::string& path : site.stale)
     std::cerr << "note: " << printable(path)
               << " is left out: no model makes this package any more (compile --remove-stale removes it)\n";
+  if (!site.links.empty()) std::cerr << "note: " << printable(site.links) << '\n';
   write_site(site, args.folder);
   const std::string page = (std::filesystem::path(args.folder) / "index.html").string();
   if (args.json)

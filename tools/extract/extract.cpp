@@ -181,6 +181,10 @@ std::vector<Extracted> extract_files(PackageReader& package, const ExtractReques
   for (std::size_t i = 0; i < out.size(); ++i) {
     Extracted& file = out[i];
     if (!units.empty()) file.notes.push_back(units);
+    if (std::ranges::count(file.images, FileImage::kAvif, &ExtractedImage::format) > 0)
+      file.notes.emplace_back(
+          "images are AVIF (EXT_texture_avif): three.js, <model-viewer>, Babylon.js and glTF-Transform read them, "
+          "Blender does not");
     const std::size_t before = file.glb.size();
     if (file.asked_bytes > 0 && !add_words(file.glb, words, file.asked_bytes))
       file.notes.emplace_back(

@@ -169,8 +169,15 @@ std::vector<int> scene_roots(const Source& source, const tinygltf::Model& model)
   return roots;
 }
 
-/// The instances of the scene that is read, depth first in the order of the file. InputError when the nodes
-/// are no tree.
+/// KHR_node_visibility, of a node and all beneath it.
+bool is_hidden(const GltfJson& document, std::size_t n) {
+  static const GltfJson::json_pointer at("/extensions/KHR_node_visibility/visible");
+  const GltfJson& node = document["nodes"][n];
+  return node.contains(at) && node.at(at) == false;
+}
+
+/// The instances of the scene that is read, depth first in the order of the file, without those that are
+/// hidden. InputError when the nodes are no tree.
 std::vector<Instance> find_instances(const Source& source, const GltfJson& document,
                                      const tinygltf::Model& model, Buffers& buffers) {
   // No recursion: a chain may be as long as the file allows.
@@ -184,6 +191,7 @@ std::vector<Instance> find_instances(const Source& source, const GltfJson& docum
   for (auto r = roots.rbegin(); r != roots.rend(); ++r) stack.push_back({*r, {}});
   std::vector<bool> seen(model.nodes.size());
   std::vector<Instance> found;
+  std::size_t hidden = 0;
   while (!stack.empty()) {
     const Pending p = stack.back();
     stack.pop_back();
@@ -192,6 +200,10 @@ std::vector<Instance> find_instances(const Source& source, const GltfJson& docum
       source.fail("/nodes/" + std::to_string(n), "a tree of nodes", "a node with two parents, or a cycle");
     }
     seen[n] = true;
+    if (is_hidden(document, n)) {
+      ++hidden;
+      continue;
+    }
     const tinygltf::Node& node = model.nodes[n];
     const Affine local = local_map(source, node, n), to_scene = p.to_scene * local;
     const auto rounding_of = [](const Affine& outer, const Affine& a) {
@@ -207,6 +219,12 @@ std::vector<Instance> find_instances(const Source& source, const GltfJson& docum
                          std::max(rounding, rounding_of(to_scene, copy))});
     for (auto c = node.children.rbegin(); c != node.children.rend(); ++c)
       stack.push_back({*c, to_scene, rounding});
+  }
+  if (hidden > 0) {
+    source.lost["hidden nodes"] += hidden;
+    add_warning(source.notes, "hidden-nodes", "/nodes",
+                (hidden == 1 ? "1 node is" : std::to_string(hidden) + " nodes are") +
+                    " left out with all beneath: KHR_node_visibility hides what is not to be seen");
   }
   return found;
 }
@@ -404,11 +422,11 @@ class GltfReader {
 };
 
 bool is_supported(const std::string& extension) {
-  static constexpr std::array<std::string_view, 10> kSupported{
+  static constexpr std::array<std::string_view, 11> kSupported{
       "KHR_draco_mesh_compression", "KHR_mesh_quantization", "EXT_meshopt_compression",
       "KHR_meshopt_compression",    "KHR_texture_transform", "EXT_texture_webp",
       "EXT_texture_avif",           "KHR_texture_basisu",    "KHR_materials_unlit",
-      "EXT_mesh_gpu_instancing"};
+      "EXT_mesh_gpu_instancing",    "KHR_node_visibility"};
   return find_material_extension(extension) ||
          std::find(kSupported.begin(), kSupported.end(), extension) != kSupported.end();
 }
@@ -416,12 +434,20 @@ bool is_supported(const std::string& extension) {
 /// What leaves the mesh and its textures as they are: lights, variants, words about parts. Viewers show such
 /// a file though it requires them.
 bool is_beside_the_surface(const std::string& extension) {
-  static constexpr std::string_view kSuch[] = {
-      "KHR_lights_punctual",      "KHR_animation_pointer",   "KHR_xmp",
-      "KHR_xmp_json_ld",          "KHR_node_visibility",     "KHR_interactivity",
-      "EXT_mesh_features",        "EXT_structural_metadata", "EXT_instance_features",
-      "EXT_feature_metadata",     "EXT_lights_image_based",  "CESIUM_RTC",
-      "CESIUM_primitive_outline", "AGI_articulations",       "MSFT_lod"};
+  static constexpr std::string_view kSuch[] = {"KHR_lights_punctual",
+                                               "KHR_animation_pointer",
+                                               "KHR_xmp",
+                                               "KHR_xmp_json_ld",
+                                               "KHR_interactivity",
+                                               "EXT_mesh_features",
+                                               "EXT_structural_metadata",
+                                               "EXT_instance_features",
+                                               "EXT_feature_metadata",
+                                               "EXT_lights_image_based",
+                                               "CESIUM_RTC",
+                                               "CESIUM_primitive_outline",
+                                               "AGI_articulations",
+                                               "MSFT_lod"};
   return extension.find("_materials_") != extension.npos ||
          std::ranges::find(kSuch, extension) != std::end(kSuch);
 }

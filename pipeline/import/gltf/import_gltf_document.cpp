@@ -148,7 +148,8 @@ compressions KHR_draco_mesh_compression=draco
 draco bufferView!=@bufferViews attributes!=int{}
 node mesh=@meshes children=@nodes[] matrix=number*16 rotation=number*4 scale=number*3 translation=number*3
 node extensions=copies
-copies EXT_mesh_gpu_instancing=instancing
+copies EXT_mesh_gpu_instancing=instancing KHR_node_visibility=visibility
+visibility visible=truth
 instancing attributes!=@accessors{}
 scene nodes=@nodes[]
 )";

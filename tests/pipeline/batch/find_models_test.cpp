@@ -65,6 +65,18 @@ TEST(FindModels, ScansInFormatsThatAreNotReadAreTold) {
   EXPECT_EQ(notes[0].text, "2 files of formats that texmesh does not read are left out, a.FBX among them");
 }
 
+TEST(FindModels, ACollectionFileThatAFolderHasIsToldOf) {
+  const TemporaryFolder folder;
+  write_text(folder / "a.glb", "x");
+  write_text(folder / "collection.json", "{}");
+  Notes notes;
+  list_models(folder.path().string(), &notes);
+  ASSERT_EQ(notes.size(), 1u);
+  EXPECT_EQ(notes[0].code, "collection-not-read");
+  EXPECT_NE(notes[0].text.find("compile " + (folder / "collection.json") + " itself"), std::string::npos)
+      << notes[0].text;
+}
+
 TEST(FindModels, FoldersKeepTheirTreeAndSkipWhatIsNoModel) {
   const TemporaryFolder folder;
   fs::create_directories(folder / "sub/deep");

@@ -169,6 +169,17 @@ TEST(Progress, TheBarEndsWithoutATrace) {
   EXPECT_EQ(text.back(), '\n');
 }
 
+TEST(Progress, CancelledModelsAreNotDone) {
+  std::ostringstream out;
+  Progress progress(out, OutputMode::kTerminal, false, false);
+  progress.begin({{"a.obj", 1}, {"b.obj", 1}});
+  WorkerReport cancelled;
+  cancelled.result = ModelResult::kCancelled;
+  progress.started(0, "a.texmesh");
+  progress.finished(0, cancelled, "a.texmesh");
+  EXPECT_NE(out.str().find("[                        ] 0/2"), std::string::npos) << out.str();
+}
+
 TEST(Progress, ABarIsNoWiderThanTheTerminal) {
   std::ostringstream out;  // 80 columns where nobody knows
   Progress progress(out, OutputMode::kTerminal, false, false);

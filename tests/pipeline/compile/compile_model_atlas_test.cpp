@@ -71,11 +71,12 @@ class AutoAtlas : public ::testing::Test {
   }
   CompileOutcome compile(AtlasMode mode) { return compile(mode, store_); }
   CompileOutcome compile(AtlasMode mode, Store& store) {
-    ran_.clear(), explained_.clear();
+    ran_.clear(), explained_.clear(), hits_ = 0;
     CompileRequest wanted = request(mode);
     wanted.explainer = [&](const Stage& stage, const StageExplanation&) { ++explained_[stage.name]; };
     return compile_model(wanted, store, {}, [&](const Stage& stage, StageEvent event, double, double) {
       if (event == StageEvent::kRan) ++ran_[stage.name];
+      hits_ += event == StageEvent::kHit;
     });
   }
   static std::string told(const CompileOutcome& outcome) {
@@ -87,6 +88,7 @@ class AutoAtlas : public ::testing::Test {
   MemoryStore store_;
   CompileOptions options_;
   std::map<std::string, int> ran_, explained_;
+  int hits_ = 0;
 };
 
 TEST_F(AutoAtlas, KeepsAGoodAtlasByteForByte) {
@@ -99,8 +101,10 @@ TEST_F(AutoAtlas, KeepsAGoodAtlasByteForByte) {
   EXPECT_EQ(told(kept), "");
   EXPECT_EQ(kept.package_digest, chosen.package_digest);
   EXPECT_TRUE(ran_.empty());
+  EXPECT_GT(hits_, 0);
   NullStore nothing;
   EXPECT_EQ(compile(AtlasMode::kAuto, nothing).package_digest, chosen.package_digest);
+  EXPECT_EQ(hits_, 0) << "nothing comes from a cache that is not there";
   for (const auto& [stage, times] : ran_)
     if (stage != "fill") EXPECT_EQ(times, 1) << stage << " without a cache";  // fill is never kept
 }

@@ -236,6 +236,22 @@ TEST(Atlas, WarnsOfTexturesThatRepeatMoreOftenThanItHasRoomFor) {
   }
 }
 
+TEST(Atlas, TellsAGainWhereChartsGotFewerAlone) {
+  const auto told = [](const Mesh& mesh, float times) {
+    Mesh repeated = mesh;
+    for (Vec2f& uv : repeated.uv0) uv = uv * times;
+    std::string all;
+    for (const Note& n : charted(repeated, {data_material(0)}, {places(64)}).made.notes) all += n.text + "\n";
+    return all;
+  };
+  const std::string fewer = told(scattered(testing::bumpy_sphere(10, 14)), 1);
+  EXPECT_NE(fewer.find("take fewer bytes"), std::string::npos) << fewer;
+  EXPECT_EQ(fewer.find("saves nothing"), std::string::npos) << fewer;
+  const std::string more = told(testing::bumpy_sphere(10, 14), 60);
+  EXPECT_NE(more.find("for 1, so it saves nothing: --atlas keep"), std::string::npos) << more;
+  EXPECT_NE(more.find("has less than 1 % of the texels"), std::string::npos) << more;
+}
+
 TEST(Atlas, StrangeModelsAreRebuiltOrKept) {
   const std::vector<Mesh> meshes = testing::strange_models();
   for (std::size_t i = 0; i < meshes.size(); ++i)

@@ -314,4 +314,18 @@ TEST(CheckGlb, Meshopt) {
   EXPECT_TRUE(finds(g.glb(), "glb-decode", at));
 }
 
+TEST(CheckGlb, MeshoptViewsHoldAtMost4GiBTogether) {
+  GlbParts g = meshopt_cube();
+  const auto says = [&](std::size_t view, std::uint64_t bytes) {
+    json& stream = g.json["bufferViews"][view]["extensions"]["EXT_meshopt_compression"];
+    stream["count"] = bytes / stream["byteStride"].get<std::uint64_t>();
+    return check(g.glb()).text.find("at most 4 GiB in all views") != std::string::npos;
+  };
+  EXPECT_FALSE(says(0, 3ull << 30)) << "it alone is refused by what its data can hold";
+  EXPECT_FALSE(says(2, 1ull << 29));
+  EXPECT_TRUE(says(2, 3ull << 29));
+  g = meshopt_cube();
+  EXPECT_TRUE(says(0, 5ull << 30));
+}
+
 }  // namespace texmesh::check_glb_test

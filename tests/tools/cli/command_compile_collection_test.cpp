@@ -148,6 +148,7 @@ TEST_F(Collection, AnotherOptionRunsItsStageAndWhatSeesOtherBytes) {
   EXPECT_EQ(ran_in(events({"--rungs", "50", "--title", "Coin"})),
             (std::map<std::string, Stages>{{"a.obj", {"package"}}}));
   const CommandResult explained = compile({"--rungs", "50", "--title", "Vase", "--explain"});
+  EXPECT_EQ(explained.errors.find("--title"), std::string::npos) << "one model: " << explained.errors;
   EXPECT_NE(explained.output.find("runs: package.title \"Coin\" -> \"Vase\""), std::string::npos)
       << explained.output;
   EXPECT_EQ(explained.output.find("runs: "), explained.output.rfind("runs: ")) << explained.output;
@@ -236,6 +237,7 @@ TEST_F(Collection, ADryRunSaysFirstHowManyAndThenALineAModel) {
   const CommandResult again = compile({"--dry-run"});
   EXPECT_NE(again.output.find("b.obj: every stage from the cache\n"), std::string::npos) << again.output;
   const CommandResult title = compile({"--dry-run", "--title", "Coin"});
+  EXPECT_NE(title.errors.find("--title: all 3 packages have this title"), std::string::npos) << title.errors;
   EXPECT_NE(title.output.find("a.obj: package runs: package.title \"\" -> \"Coin\""), std::string::npos)
       << title.output;
 }

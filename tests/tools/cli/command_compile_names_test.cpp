@@ -55,6 +55,25 @@ TEST_F(Names, AFileThatComesLaterIsSeen) {
   EXPECT_EQ(exact.find("up to date"), std::string::npos) << exact;
 }
 
+TEST_F(Names, ADownloadOfSketchfabFindsItsTextures) {
+  fs::create_directories(folder_ / "get/textures");
+  fs::rename(folder_ / "repository/scans", folder_ / "get/source");
+  fs::rename(folder_ / ("get/source/" + texture_), folder_ / ("get/textures/" + texture_));
+  const std::vector<std::string> required = sandbox_support().complete()
+                                                ? std::vector<std::string>{"--sandbox", "require"}
+                                                : std::vector<std::string>{};
+  const std::string alone = compile(folder_ / "get/source/a.obj", required);
+  EXPECT_NE(alone.find("missing-texture"), std::string::npos) << alone;
+  EXPECT_NE(alone.find("compile the folder of both"), std::string::npos) << alone;
+  const std::string both = compile(folder_ / "get", required);
+  EXPECT_NE(both.find("moved-file"), std::string::npos) << both;
+  EXPECT_EQ(both.find("missing-texture"), std::string::npos) << both;
+  EXPECT_NE(compile(folder_ / "get").find("up to date"), std::string::npos);
+  fs::remove(folder_ / ("get/textures/" + texture_));
+  EXPECT_NE(compile(folder_ / "get").find("missing-texture"), std::string::npos);
+  EXPECT_EQ(run_command({TEXMESH_BINARY, "verify", folder_ / "out/source/a.texmesh"}).exit_code, 0);
+}
+
 TEST_F(Names, LinksAreFollowedWithinTheFolderThatWasNamed) {
   fs::create_directories(folder_ / "repository/.annex");
   fs::rename(scans(texture_), folder_ / "repository/.annex/key");

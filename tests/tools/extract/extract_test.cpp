@@ -10,6 +10,7 @@
 #include "stages/image/decode_image.h"
 #include "tests/support/packages.h"
 #include "tools/extract/extract.h"
+#include "tools/extract/usdz/usdz.h"
 
 namespace texmesh::extract_test {
 
@@ -259,10 +260,25 @@ TEST(ExtractModel, AvifFillsTheBytesAndIsReadAgain) {
   EXPECT_LE(e.glb.size(), 6000u);
   ASSERT_FALSE(e.images.empty());
   for (const ExtractedImage& i : e.images) EXPECT_EQ(i.format, FileImage::kAvif);
+  EXPECT_EQ(
+      std::ranges::count_if(e.notes, [](const auto& n) { return n.find("Blender does not") != n.npos; }), 1);
+  r.images = ExtractImages::kWebp;
+  EXPECT_EQ(extract({r}).notes.size() + 1, e.notes.size());
   NoFiles none;
   const Model model = import_package_glb("x.glb", e.glb, none, {}).model;
   ASSERT_EQ(model.images.size(), e.images.size());
   EXPECT_EQ(model.images[0].width_px, e.images[0].width_px);
+}
+
+/// Its meshes take several times a GLB's bytes: the fifth GLB that is tried fits, no earlier one.
+TEST(ExtractModel, AUsdzOfFewBytesIsLookedForUntilItFits) {
+  PackageReader package(open_store(TEXMESH_SOURCE_DIR "/tests/golden/v2.0-scan.texmesh"));
+  const Extracted found = extract_usdz(package, {budget({25'000})}, {}).front();
+  EXPECT_TRUE(found.within);
+  EXPECT_LE(found.glb.size(), 25'000u);
+  const Extracted least = extract_usdz(package, {budget({1})}, {}).front();
+  EXPECT_FALSE(least.within);
+  EXPECT_LT(least.glb.size(), found.glb.size());
 }
 
 TEST(ExtractModel, ReportsAreJson) {

@@ -3,8 +3,6 @@
 #include "tools/cli/options/command_line.h"
 
 #include <fmt/format.h>
-#include <sys/ioctl.h>
-#include <unistd.h>
 
 #include <CLI/CLI.hpp>
 #include <cstdlib>
@@ -36,37 +34,11 @@ struct HelpNotes {
 
 constexpr std::size_t kTextColumn = 28;
 
-std::size_t help_width() {
-  constexpr int kLeast = 60, kMost = 100;
-  const char* columns = std::getenv("COLUMNS");
-  int width = columns != nullptr ? std::atoi(columns) : 0;
-  if (winsize window{}; width <= 0 && ::ioctl(STDOUT_FILENO, TIOCGWINSZ, &window) == 0) width = window.ws_col;
-  return static_cast<std::size_t>(std::clamp(width > 0 ? width : kMost, kLeast, kMost));
-}
-
-/// `text` after the `column` characters that its first line has already; further lines begin at `indent`.
-std::string wrapped(const std::string& text, std::size_t column, std::size_t indent) {
-  const std::size_t width = help_width();
-  std::istringstream words(text);
-  std::string out;
-  bool first = true;
-  for (std::string word; words >> word; first = false) {
-    if (!first && column + 1 + word.size() > width) {
-      out += "\n" + std::string(indent, ' ');
-      column = indent;
-    } else if (!first) {
-      out += ' ', ++column;
-    }
-    out += word, column += word.size();
-  }
-  return out + "\n";
-}
-
 std::string two_columns(const std::string& left, const std::string& text) {
   std::string out = "  " + left;
   if (out.size() + 2 > kTextColumn) out += "\n";
   const std::size_t used = out.back() == '\n' ? 0 : out.size();
-  return out + std::string(kTextColumn - used, ' ') + wrapped(text, kTextColumn, kTextColumn);
+  return out + std::string(kTextColumn - used, ' ') + wrapped_text(text, kTextColumn, kTextColumn);
 }
 
 /// Lines that begin with a blank stay as they are.
@@ -74,7 +46,7 @@ std::string paragraphs(const std::string& text) {
   std::istringstream lines(text);
   std::string out;
   for (std::string line; std::getline(lines, line);)
-    out += line.starts_with(" ") ? line + "\n" : wrapped(line, 0, 0);
+    out += line.starts_with(" ") ? line + "\n" : wrapped_text(line, 0, 0);
   return out;
 }
 
@@ -89,27 +61,39 @@ std::string option_names(const CLI::Option& o, bool short_only) {
   return names;
 }
 
-/// What the option does, the words that its value is one of, its default, what it excludes.
+/// What the option does, the words that its value is one of, its default.
 std::string option_description(const CLI::Option& o, const HelpNotes& notes) {
   std::string text = o.get_description();
   if (const auto it = notes.choices.find(&o); it != notes.choices.end()) text += " " + it->second;
   if (notes.with_default.contains(&o)) text += " (default " + o.get_default_str() + ")";
-  for (const CLI::Option* other : o.get_excludes()) text += " (not with " + option_names(*other, false) + ")";
   return text;
 }
 
-std::string option_line(const CLI::Option& o, const Everyday* everyday, const HelpNotes& notes) {
+/// " (not with --bytes, --lods)": those of `shown` that stand before the option, so that a pair is told once.
+std::string excluded(const CLI::Option& o, const std::vector<const CLI::Option*>& shown) {
+  std::string names;
+  for (const CLI::Option* other : shown)
+    if (other == &o)
+      break;
+    else if (o.get_excludes().contains(const_cast<CLI::Option*>(other)))
+      names += (names.empty() ? "" : ", ") + option_names(*other, false);
+  return names.empty() ? "" : " (not with " + names + ")";
+}
+
+std::string option_line(const CLI::Option& o, const Everyday* everyday, const HelpNotes& notes,
+                        const std::vector<const CLI::Option*>& shown = {}) {
   std::string left = option_names(o, everyday != nullptr);
   if (!o.get_positional() && o.get_type_size() != 0 && !o.get_type_name().empty())
     left += " " + o.get_type_name();
   const bool own_text = everyday == nullptr || everyday->text.empty();
-  return two_columns(left, own_text ? option_description(o, notes) : everyday->text);
+  return two_columns(left, (own_text ? option_description(o, notes) : everyday->text) + excluded(o, shown));
 }
 
 /// Groups in the order in which their first options were added.
 std::string option_groups(const CLI::App& app, bool full, const HelpNotes& notes) {
   std::vector<std::string> titles;
   std::map<std::string, std::string> lines;
+  std::vector<const CLI::Option*> shown;
   for (const CLI::Option* o : app.get_options()) {
     const auto found = notes.everyday.find(o);
     const Everyday* everyday = full || found == notes.everyday.end() ? nullptr : &found->second;
@@ -118,7 +102,8 @@ std::string option_groups(const CLI::App& app, bool full, const HelpNotes& notes
                               : everyday != nullptr ? everyday->title
                                                     : o->get_group();
     if (!lines.contains(title)) titles.push_back(title);
-    lines[title] += option_line(*o, everyday, notes);
+    lines[title] += option_line(*o, everyday, notes, shown);
+    shown.push_back(o);
   }
   std::string out;
   for (const char* first : {"Arguments", "Options"})
@@ -154,7 +139,7 @@ std::string usage(const CLI::App& app, const std::string& name) {
     if (o->get_positional() && o->get_expected_max() > 1) shown += "...";
     line += o->get_required() ? " " + shown : " [" + shown + "]";
   }
-  return wrapped(line, 0, 4);
+  return wrapped_text(line, 0, 4);
 }
 
 std::string note_of(const std::map<const CLI::App*, std::string>& notes, const CLI::App* app) {
@@ -173,7 +158,7 @@ std::string group_alone(const CLI::App& app, const std::string& name, const Help
 /// columns; COLUMNS, where set, instead of the terminal's; 100 where there is none).
 std::string help_text(const CLI::App& app, const std::string& name, bool full, const HelpNotes& notes) {
   if (!notes.only_group.empty()) return group_alone(app, name, notes);
-  std::string out = wrapped(app.get_description(), 0, 0) + usage(app, name);
+  std::string out = wrapped_text(app.get_description(), 0, 0) + usage(app, name);
   if (const std::string lines = note_of(notes.examples, &app); !lines.empty())
     out += "\nExamples:\n" + paragraphs(lines);
   out += command_groups(app, full, notes) + option_groups(app, full, notes);
@@ -290,11 +275,12 @@ std::string roff(const std::string& text) {
   return lines;
 }
 
-std::string roff_option(const CLI::Option& option, const HelpNotes& notes) {
+std::string roff_option(const CLI::Option& option, const CLI::App& app, const HelpNotes& notes) {
   std::string left =
       option.get_positional() ? option.get_name(true, false) : in_a_row(option_words(option), ", ");
   if (!option.get_positional() && !option.get_type_name().empty()) left += " " + option.get_type_name();
-  return ".TP\n.B " + roff(left) + roff(option_description(option, notes));
+  return ".TP\n.B " + roff(left) +
+         roff(option_description(option, notes) + excluded(option, app.get_options()));
 }
 
 /// Lines as they are: of examples, and of notes that begin with a blank.
@@ -310,7 +296,7 @@ std::string roff_notes(const std::string& text) {
 
 std::string roff_command(const NamedCommand& command, const HelpNotes& notes) {
   std::string out = ".SS " + roff(command.path) + roff(command.app->get_description());
-  for (const CLI::Option* o : command.app->get_options()) out += roff_option(*o, notes);
+  for (const CLI::Option* o : command.app->get_options()) out += roff_option(*o, *command.app, notes);
   if (const std::string lines = note_of(notes.examples, command.app); !lines.empty())
     out += ".PP\nExamples:\n.PP\n" + roff_lines(lines);
   return out + roff_notes(note_of(notes.notes, command.app));
@@ -419,7 +405,7 @@ std::string manual_page(const CLI::App& program, const HelpNotes& notes) {
   out += roff_notes(note_of(notes.notes, &program)) + ".PP\nExamples:\n.PP\n" +
          roff_lines(note_of(notes.examples, &program));
   out += ".SH OPTIONS\n";
-  for (const CLI::Option* o : program.get_options()) out += roff_option(*o, notes);
+  for (const CLI::Option* o : program.get_options()) out += roff_option(*o, program, notes);
   out += ".SH COMMANDS\n";
   const std::vector<NamedCommand> commands = commands_beneath(program, program.get_name());
   for (auto c = commands.begin() + 1; c != commands.end(); ++c) out += roff_command(*c, notes);

@@ -157,6 +157,15 @@ class CommandLine {
   std::unique_ptr<CLI::App> app_;
 };
 
+/// Columns of a terminal, or of COLUMNS, within the bounds of a page of help.
+std::size_t help_width();
+/// `text` after the `column` characters that its first line has already; further lines begin at `indent`.
+std::string wrapped_text(const std::string& text, std::size_t column, std::size_t indent);
+/// Lines that are wider than `width` go on beneath their last column, or beneath the text of their item.
+std::string wrapped_lines(const std::string& text, std::size_t width);
+/// The text as standard output takes it: wrapped for a terminal, as it is for files and pipes.
+std::string for_terminal(const std::string& text);
+
 /// Runs what gives an exit code. What it throws is printed; the exit code is then that of exit_codes.h: 2 for
 /// a UsageError, 1 for other errors of inputs and files, 3 for mistakes of ours.
 int run_and_print_errors(const std::function<int()>& run);

@@ -1,6 +1,9 @@
 #include "tools/cli/options/common_options.h"
 
+#include <sys/ioctl.h>
+
 #include <cstdlib>
+#include <sstream>
 
 #include "pipeline/batch/fleet/run_summary.h"
 #include "pipeline/cache/disk_store.h"
@@ -22,7 +25,60 @@ int with_all_printed(int exit_code) {
   return exit_code == kExitOk ? kExitModelFailed : exit_code;
 }
 
+/// One line, broken where it is wider than `width`; what follows stands beneath its last column, or item.
+std::string broken_line(const std::string& line, std::size_t width) {
+  if (line.size() <= width) return line;
+  if (line.find_first_not_of(" -") == std::string::npos) return line.substr(0, width);  // beneath a heading
+  const std::size_t gap = line.rfind("  ");
+  std::size_t indent = gap != std::string::npos ? gap + 2 : line.starts_with("- ") ? 2 : 0;
+  if (indent > width / 2) indent = 4;
+  std::string out = line;
+  for (std::size_t begin = 0; begin + width < out.size();) {
+    const std::size_t blank = out.rfind(' ', begin + width);
+    if (blank == std::string::npos || blank <= begin + indent) break;  // a word that is wider
+    out.replace(blank, 1, "\n" + std::string(indent, ' '));
+    begin = blank + 1;
+  }
+  return out;
+}
+
 }  // namespace
+
+std::size_t help_width() {
+  constexpr int kLeast = 60, kMost = 100;
+  const char* columns = std::getenv("COLUMNS");
+  int width = columns != nullptr ? std::atoi(columns) : 0;
+  if (winsize window{}; width <= 0 && ::ioctl(STDOUT_FILENO, TIOCGWINSZ, &window) == 0) width = window.ws_col;
+  return static_cast<std::size_t>(std::clamp(width > 0 ? width : kMost, kLeast, kMost));
+}
+
+std::string wrapped_text(const std::string& text, std::size_t column, std::size_t indent) {
+  const std::size_t width = help_width();
+  std::istringstream words(text);
+  std::string out;
+  bool first = true;
+  for (std::string word; words >> word; first = false) {
+    if (!first && column + 1 + word.size() > width) {
+      out += "\n" + std::string(indent, ' ');
+      column = indent;
+    } else if (!first) {
+      out += ' ', ++column;
+    }
+    out += word, column += word.size();
+  }
+  return out + "\n";
+}
+
+std::string wrapped_lines(const std::string& text, std::size_t width) {
+  std::istringstream lines(text);
+  std::string out;
+  for (std::string line; std::getline(lines, line);) out += broken_line(line, width) + "\n";
+  return out;
+}
+
+std::string for_terminal(const std::string& text) {
+  return ::isatty(STDOUT_FILENO) == 1 ? wrapped_lines(text, help_width()) : text;
+}
 
 int run_and_print_errors(const std::function<int()>& run) {
   try {

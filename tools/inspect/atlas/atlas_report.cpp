@@ -52,6 +52,9 @@ constexpr double kJustSeen = 2.3;
 
 std::string percents(double share) { return fixed(100 * share, share < 0.0995 ? 1 : 0) + " %"; }
 
+/// Two digits, and whole numbers from there on.
+std::string rough(double x) { return shortest(x, x < 99.5 ? 2 : 3); }
+
 using AdviceList = std::vector<AtlasAdvice>;
 
 void advise_on_charts(const AtlasDiagnosis& d, AdviceList& out) {
@@ -67,8 +70,13 @@ void advise_on_charts(const AtlasDiagnosis& d, AdviceList& out) {
            kilobytes(d.floor_bytes())),
        "Make a new atlas with fewer and larger charts: remove loose specks, close holes and smooth noise "
        "first, because unwrappers cut at creases; then unwrap the finished mesh and bake the texture onto "
-       "it. Or try compile --atlas auto: it makes larger charts where lit pictures then look better for the same "
-       "bytes. With --atlas rebuild close views touch about half the texels."});
+       "it." +
+           std::string(
+               d.charts() < kFewCharts
+                   ? ""
+                   : " Or try compile --atlas auto: it makes larger charts where lit pictures then look "
+                     "better for the same bytes. With --atlas rebuild close views touch about half the "
+                     "texels.")});
 }
 
 void advise_on_packing(const NamedAtlas& a, AdviceList& out) {
@@ -109,8 +117,8 @@ void advise_on_looks(const NamedAtlas& a, AdviceList& out) {
          fmt::format("Colours on both sides of seams differ by {} in the mean and {} along the worst "
                      "twentieth (CIE 1976; {} can just be seen), and by {} from one texel to the next. Seams "
                      "show as lines.",
-                     shortest(a.seam_colours->mean, 2), shortest(a.seam_colours->p95, 2), kJustSeen,
-                     shortest(a.seam_colours->inside, 2)),
+                     rough(a.seam_colours->mean), rough(a.seam_colours->p95), kJustSeen,
+                     rough(a.seam_colours->inside)),
          "Let the texturing equalise exposures and blend photos across charts, and continue each chart's "
          "colours some 4 texels beyond its border."});
   if (a.density_spread() > kWideSpread)
@@ -124,7 +132,7 @@ void advise_on_looks(const NamedAtlas& a, AdviceList& out) {
     out.push_back({"stretch", a.name,
                    fmt::format("On a twentieth of the surface texels are more than {} times as long as wide. "
                                "Details smear along them.",
-                               shortest(a.stretch.p95, 2)),
+                               rough(a.stretch.p95)),
                    "Cut strongly curved charts once more, or let the unwrapper relax them with a limit for "
                    "stretch."});
 }

@@ -216,6 +216,10 @@ class Canvas {
   double step_ = 1, top_value_ = 1, low_value_ = 0;
 };
 
+std::string dot(const PlotSeries& s, double x, double y) {
+  return fmt::format("<circle class=\"f{}\" cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"2.6\"/>", s.colour, x, y);
+}
+
 /// And the height of its lines.
 std::pair<std::string, double> legend(const std::vector<PlotSeries>& series, double top) {
   std::string svg;
@@ -224,10 +228,10 @@ std::pair<std::string, double> legend(const std::vector<PlotSeries>& series, dou
     if (s.name.empty()) continue;
     const double width = 34 + 7.0 * static_cast<double>(s.name.size());
     if (x > kLeft && x + width > kWidth) x = kLeft, y += kLegendLine;
-    svg += fmt::format(
-        "<path class=\"line {} {} {}\" d=\"M{:.1f} {:.1f}h20\"/><text x=\"{:.1f}\" y=\"{:.1f}\">{}</text>\n",
-        s.colour, s.strong ? "strong" : "", s.dashed ? "dash" : "", x, y - 4, x + 26, y,
-        markup_escaped(s.name));
+    svg += s.dots ? dot(s, x + 10, y - 4)
+                  : fmt::format("<path class=\"line {} {} {}\" d=\"M{:.1f} {:.1f}h20\"/>", s.colour,
+                                s.strong ? "strong" : "", s.dashed ? "dash" : "", x, y - 4);
+    svg += fmt::format("<text x=\"{:.1f}\" y=\"{:.1f}\">{}</text>\n", x + 26, y, markup_escaped(s.name));
     x += width;
   }
   return {svg, svg.empty() ? 0 : y - top + kLegendLine};
@@ -250,9 +254,7 @@ std::string Plot::svg() const {
       out += fmt::format("<path class=\"line {} {} {}\" d=\"{}\"/>\n", s.colour, s.strong ? "strong" : "",
                          s.dashed ? "dash" : "", canvas.path(s));
     if (s.dots || s.strong)
-      for (const auto& [px, py] : s.points)
-        out += fmt::format("<circle class=\"f{}\" cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"2.6\"/>\n", s.colour,
-                           canvas.x(px), canvas.y(py));
+      for (const auto& [px, py] : s.points) out += dot(s, canvas.x(px), canvas.y(py)) + "\n";
   }
   return out + names + "</svg>\n";
 }

@@ -463,8 +463,9 @@ std::string object_name(const std::string& path) {
 }
 
 Site read_site(const std::string& packages, const SiteOptions& options) {
-  Site site{options, {}, {}, {}};
+  Site site{options, {}, {}, {}, {}};
   const PackageFolder folder = find_packages(packages);
+  site.links = links_left_out(folder);
   const std::set<std::string> stale = listed_stale(folder.path);
   std::map<std::string, std::string> taken;  // path of the package, by the name of its pages
   for (const std::string& path : folder.packages) {

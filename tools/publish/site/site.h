@@ -70,6 +70,7 @@ struct Site {
   std::vector<SiteObject> objects;  // by title
   std::vector<SiteFault> faults;
   std::vector<std::string> stale;  // paths of packages that no model makes any more
+  std::string links;               // what is said of symbolic links, see links_left_out()
 };
 
 /// What a folder of packages (or one package) holds: every package beneath it, hidden ones and symbolic links

@@ -277,8 +277,8 @@ int open_folder_or_throw(const std::string& path) {
   return fd;
 }
 
-void list_packages(const fs::path& folder, const std::string& prefix, int depth,
-                   std::vector<std::string>& found) {
+void list_packages(const fs::path& folder, const std::string& prefix, int depth, PackageFolder& out) {
+  std::vector<std::string>& found = out.packages;
   std::error_code error;
   std::vector<fs::directory_entry> entries;
   for (fs::directory_iterator it(folder, error), end; !error && it != end; it.increment(error))
@@ -289,12 +289,14 @@ void list_packages(const fs::path& folder, const std::string& prefix, int depth,
     const std::string name = e.path().filename().string();
     const fs::file_status status = e.symlink_status(error);
     if (name.starts_with(".")) continue;
+    if (fs::is_symlink(status) && (name.ends_with(kEnding) || e.is_directory(error)))
+      out.links.push_back(prefix + name);
     if (fs::is_regular_file(status) && name.ends_with(kEnding)) found.push_back(prefix + name);
     if (!fs::is_directory(status)) continue;
     if (fs::is_regular_file(fs::symlink_status(e.path() / kManifestPath, error)))
       found.push_back(prefix + name + "/");
     else if (depth < kMaxDepth)
-      list_packages(e.path(), prefix + name + "/", depth + 1, found);
+      list_packages(e.path(), prefix + name + "/", depth + 1, out);
   }
 }
 
@@ -404,12 +406,21 @@ PackageFolder find_packages(const std::string& package) {
   if (!folder && !fs::is_regular_file(path))
     throw InputError(package, "", "a regular file", "something else");
   if (!folder || tree)
-    return {path.parent_path().string(), {path.filename().string() + (tree ? "/" : "")}, true};
-  PackageFolder found{path.string(), {}, false};
-  list_packages(path, "", 0, found.packages);
+    return {path.parent_path().string(), {path.filename().string() + (tree ? "/" : "")}, true, {}};
+  PackageFolder found{path.string(), {}, false, {}};
+  list_packages(path, "", 0, found);
   if (found.packages.empty())
-    throw InputError(package, "", "a package, or a folder of packages", "no package in it");
+    throw InputError(package, "", "a package, or a folder of packages",
+                     found.links.empty() ? "no package in it" : links_left_out(found));
   return found;
+}
+
+std::string links_left_out(const PackageFolder& folder) {
+  if (folder.links.empty()) return "";
+  const std::size_t count = folder.links.size();
+  return (count == 1 ? "1 symbolic link is" : std::to_string(count) + " symbolic links are") +
+         " left out, since links may lead to what is not to be published: " + folder.links.front() +
+         (count > 1 ? " among them" : "");
 }
 
 ServedFiles::ServedFiles(const std::string& package, const std::string& viewer) {
@@ -447,13 +458,13 @@ std::optional<ServedFile> ServedFiles::open(const std::string& path) const {
 }
 
 std::vector<std::string> ServedFiles::packages() const {
-  std::vector<std::string> found;
+  PackageFolder found;
   if (!only_.empty())
-    found.push_back(only_);
+    found.packages.push_back(only_);
   else
     list_packages("/proc/self/fd/" + std::to_string(root_), "", 0, found);
-  for (std::string& p : found) p = std::string(kPrefix.substr(1)) + percent_encoded(p);
-  return found;
+  for (std::string& p : found.packages) p = std::string(kPrefix.substr(1)) + percent_encoded(p);
+  return found.packages;
 }
 
 std::string viewer_folder(const std::string& wanted) { return built_folder("viewer", "index.html", wanted); }

@@ -61,9 +61,12 @@ class ServedFile {
 struct PackageFolder {
   std::string path;  // absolute
   std::vector<std::string>
-      packages;        // relative to it, sorted, at most 10,000; unpacked ones end with a slash
-  bool alone = false;  // one package was named, not a folder of them
+      packages;                    // relative to it, sorted, at most 10,000; unpacked ones end with a slash
+  bool alone = false;              // one package was named, not a folder of them
+  std::vector<std::string> links;  // symbolic links to packages or folders, which are left out
 };
+/// "3 symbolic links are left out, such as a.texmesh: ..."; "" without any.
+std::string links_left_out(const PackageFolder& folder);
 /// `package` is a .texmesh file, an unpacked package, or a folder of such. Hidden names and symbolic links
 /// beneath it are left out. InputError when it is not there or holds no package.
 PackageFolder find_packages(const std::string& package);

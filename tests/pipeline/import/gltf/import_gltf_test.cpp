@@ -309,6 +309,26 @@ TEST(ImportGltf, ShowsEveryCopyOfAnInstancedMesh) {
   EXPECT_THROW(import(b), InputError);
 }
 
+TEST(ImportGltf, LeavesHiddenNodesOutWithAllBeneathAndTells) {
+  GltfBuilder b = quad();
+  b.json["nodes"] = {{{"mesh", 0}, {"children", {2}}}, {{"mesh", 0}}, {{"mesh", 0}}};
+  b.json["extensionsUsed"] = b.json["extensionsRequired"] = {"KHR_node_visibility"};
+  json& visibility = b.json["nodes"][0]["extensions"]["KHR_node_visibility"];
+  visibility["visible"] = true;
+  const Model all = import(b);
+  EXPECT_EQ(all.mesh.triangles.size(), 6u);
+  EXPECT_FALSE(has_note(all, "hidden-nodes", Severity::kWarning));
+  visibility["visible"] = false;
+  const Model shown = import(b);
+  EXPECT_EQ(shown.mesh.triangles.size(), 2u) << "the child of a hidden node is hidden";
+  EXPECT_TRUE(has_note(shown, "hidden-nodes", Severity::kWarning));
+  EXPECT_FALSE(has_note(shown, "required-extension", Severity::kWarning)) << "it is read";
+  visibility["visible"] = "no";
+  EXPECT_THROW(import(b), InputError);
+  b.json["nodes"][0]["extensions"]["KHR_node_visibility"] = 3;
+  EXPECT_THROW(import(b), InputError);
+}
+
 TEST(ImportGltf, ReadsTheDefaultSceneOrAllRoots) {
   GltfBuilder b = quad();
   b.json["nodes"] = {{{"mesh", 0}, {"children", {2}}}, {{"mesh", 0}}, {{"mesh", 0}}};

@@ -7,6 +7,7 @@
 
 #include "pipeline/compile/options.h"
 #include "tests/support/command.h"
+#include "tools/cli/options/command_line.h"
 
 namespace texmesh::testing::help_text_test {
 
@@ -117,6 +118,26 @@ TEST(CommandHelp, RareOptionsAreInTheFullHelpAndWork) {
       run_command({TEXMESH_BINARY, "plan", TEXMESH_SOURCE_DIR "/tests/golden/v2.0-scan.texmesh", "--policy",
                    "thesis", "--bandwidth", "2Mbit/s"});
   EXPECT_EQ(r.exit_code, 0) << r.errors;
+}
+
+TEST(CommandHelp, TellsOnceThatTwoOptionsExcludeEachOther) {
+  const std::string text = help({"extract", "--help"}, 100);
+  std::string joined = std::regex_replace(text, std::regex("\n +"), " ");
+  EXPECT_EQ(joined.find("share the search (not with"), std::string::npos) << text;
+  EXPECT_NE(joined.find("(not with --bytes, --scale)"), std::string::npos) << text;
+  EXPECT_EQ(help({"compile", "--help"}).find("keep-going"), std::string::npos)
+      << "names what it does not show";
+}
+
+TEST(WrappedLines, GoOnBeneathTheirLastColumnOrItem) {
+  EXPECT_EQ(
+      wrapped_lines("  charts  12  of many triangles\n- one two three four five\n  six seven eight nines\n",
+                    22),
+      "  charts  12  of many\n    triangles\n- one two three four\n  five\n  six seven eight\n  nines\n");
+  EXPECT_EQ(wrapped_lines("  a  bb cc dd ee\n  -------  ------------\nshort\n", 12),
+            "  a  bb cc\n     dd ee\n  -------  -\nshort\n");
+  const std::string word(40, 'x');
+  EXPECT_EQ(wrapped_lines(word + " y", 20), word + " y\n") << "a word is not cut";
 }
 
 }  // namespace texmesh::testing::help_text_test

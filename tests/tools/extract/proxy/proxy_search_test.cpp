@@ -62,6 +62,18 @@ TEST(ProxySearch, TheNearestFileIsMadeOfAProxyWhereNothingFits) {
   const Extracted before = extract(package_bytes(false), 500), after = extract(package_bytes(true), 500);
   EXPECT_FALSE(after.within);
   EXPECT_LT(after.glb.size(), before.glb.size());
+  // The least that a proxy gives, and told as any other file.
+  ASSERT_TRUE(after.proxy);
+  ASSERT_FALSE(after.images.empty());
+  std::uint64_t images = 0;
+  for (const ExtractedImage& i : after.images) {
+    EXPECT_LE(i.quality, 5) << i.role;
+    images += i.bytes;
+  }
+  EXPECT_EQ(after.mesh_bytes + images, after.glb.size());
+  EXPECT_GT(after.triangles, 0u);
+  EXPECT_GT(after.difference, 0);
+  EXPECT_EQ(extract(package_bytes(true), 1).glb.size(), after.glb.size()) << "nothing is smaller";
 }
 
 TEST(ProxySearch, ScalesLevelsAndPngsAreNotReplaced) {

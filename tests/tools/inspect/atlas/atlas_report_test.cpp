@@ -64,6 +64,14 @@ TEST(AtlasReport, AdviceNamesTheTextureAndTheRemedy) {
       << text;
 }
 
+TEST(AtlasReport, LargeFiguresAreWholeNumbers) {
+  Mesh mesh = sheet(40, 0);
+  for (Vec2f& uv : mesh.uv0) uv.y *= 0.004f;
+  const AtlasDiagnosis d = diagnosis_of(model_of(mesh));
+  ASSERT_TRUE(advises(d, "stretch"));
+  for (const AtlasAdvice& a : d.advice) EXPECT_EQ(a.found.find("e+"), std::string::npos) << a.found;
+}
+
 TEST(AtlasReport, EveryTriangleAChartIsTooMany) {
   const Mesh whole = sheet(30, 0);
   Mesh torn = whole;
@@ -83,6 +91,7 @@ TEST(AtlasReport, EveryTriangleAChartIsTooMany) {
   EXPECT_EQ(d.floor_bytes(), 8 * d.triangle_floor());
   ASSERT_TRUE(advises(d, "charts"));
   EXPECT_EQ(d.advice[0].code, "charts");
+  EXPECT_NE(d.advice[0].remedy.find("--atlas auto"), std::string::npos) << d.advice[0].remedy;
   EXPECT_TRUE(advises(d, "thin"));
 }
 

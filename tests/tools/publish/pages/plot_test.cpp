@@ -31,6 +31,16 @@ TEST(Plot, ValuesBeyondTheAxesStayInside) {
   for (const std::string& d : attributes(plot.svg(), "d")) EXPECT_EQ(d.find("inf"), std::string::npos) << d;
 }
 
+TEST(Plot, TheLegendOfDotsIsADot) {
+  Plot plot = sample();
+  plot.series = {{"dots", "c", {{1000, 0.2}, {1e6, 0.1}}, false, false, true}};
+  const std::string svg = plot.svg();
+  std::size_t dots = 0;
+  for (std::size_t at = 0; (at = svg.find("<circle class=\"fc\"", at)) != std::string::npos; ++at) ++dots;
+  EXPECT_EQ(dots, 3u) << "two values and the legend's: " << svg;
+  EXPECT_EQ(svg.find("class=\"line c"), std::string::npos) << "no line stands for them";
+}
+
 TEST(Plot, AnEmptyPlotHasAxes) {
   Plot plot;
   plot.y_high = 0;

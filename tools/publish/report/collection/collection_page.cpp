@@ -7,6 +7,7 @@
 #include "pipeline/batch/progress.h"
 #include "pipeline/io/markup.h"
 #include "pipeline/io/table.h"
+#include "pipeline/io/uri.h"
 #include "tools/publish/pages/page.h"
 
 namespace texmesh {
@@ -95,7 +96,8 @@ std::string picture_of(const ModelSummary& m, const FaceOf& face_of, const std::
   std::string out = "<div>";
   if (!face->poster.empty()) {
     files.push_back({fmt::format("{}/{:05}.jpg", folder, files.size()), std::move(face->poster)});
-    out += "<img loading=\"lazy\" alt=\"\" src=\"" + markup_escaped(files.back().name) + "\">";
+    out +=
+        "<img loading=\"lazy\" alt=\"\" src=\"" + markup_escaped(percent_encoded(files.back().name)) + "\">";
   }
   const std::string name = face->title.empty() ? m.package : face->title;
   return out + "<p>" + markup_escaped(name) + "<br><span class=\"quiet\">" + format_bytes(m.bytes) +

@@ -63,6 +63,9 @@ TEST(CollectionPage, PostersStandBesideThePageForTheFirstModels) {
   EXPECT_EQ(page.files[1].name, "posters/00001.jpg");
   EXPECT_EQ(page.files[1].bytes, (std::vector<std::uint8_t>{1, 2, 3}));
   EXPECT_NE(page.html.find("src=\"posters/00001.jpg\""), std::string::npos);
+  EXPECT_NE(collection_page(s, "my 100% #1", 2, a_face).html.find("src=\"my%20100%25%20%231/00001.jpg\""),
+            std::string::npos)
+      << "an address, not a path";
   EXPECT_NE(page.html.find("A &lt;bust&gt;"), std::string::npos);
   EXPECT_NE(page.html.find("1 min 30 s"), std::string::npos) << "what it took when it was made";
   EXPECT_NE(page.html.find("c.glb"), std::string::npos) << "in the table all the same";
