@@ -316,8 +316,7 @@ Bytes ArchiveFiles::unpacked(const ArchivedFile& file, std::uint64_t max_bytes) 
   else
     refuse_archive(*source_, place, "a file that is stored or deflated (unpack the archive first)",
                    "packing of kind " + std::to_string(file.method));
-  const auto step = [](uLong crc, ByteSpan bytes) { return crc32_z(crc, bytes.data(), bytes.size()); };
-  if (out.size() != file.bytes || (out.empty() ? 0 : step(0, out)) != file.crc32)
+  if (out.size() != file.bytes || crc_of(out) != file.crc32)
     refuse_archive(*source_, place, "the bytes that its size and CRC-32 say",
                    "others: the archive is damaged");
   return out;

@@ -1,8 +1,6 @@
 #include "tools/inspect/verify/verify.h"
 
 #include <fmt/format.h>
-#include <zlib.h>
-#include <cstdio>
 #include <new>
 #include <nlohmann/json.hpp>
 #include <numeric>
@@ -62,12 +60,8 @@ void check_fragment(const TextureInfo& texture, const PlaneTables& t, std::uint3
   const std::uint64_t stated = t.digest[rung * t.fragment_count() + i],
                       real = truncated(sha256(streams.stream(i)));
   if (stated != real) {
-    const auto hex = [](std::uint64_t v) {
-      char text[20];
-      std::snprintf(text, sizeof text, "%016llx", static_cast<unsigned long long>(v));
-      return std::string(text);
-    };
-    findings.add({"fragment-digest", "F03"}, entry, field, hex(stated), hex(real));
+    findings.add({"fragment-digest", "F03"}, entry, field, fmt::format("{:016x}", stated),
+                 fmt::format("{:016x}", real));
   }
   try {
     const std::uint64_t texels =
@@ -278,16 +272,6 @@ bool guarded(Findings& findings, const Check& check, const std::string& entry, B
   return false;
 }
 
-std::uint32_t crc_of(std::span<const std::uint8_t> bytes) {
-  return static_cast<std::uint32_t>(crc32_z(crc32_z(0, nullptr, 0), bytes.data(), bytes.size()));
-}
-
-std::string hex8(std::uint32_t v) {
-  char text[12];
-  std::snprintf(text, sizeof text, "%08x", v);
-  return text;
-}
-
 /// Reads the entries of a package, each compared with its digest and with what the container says of it.
 class CheckedStore {
  public:
@@ -361,8 +345,8 @@ class CheckedStore {
     const auto it = by_path_.find(path);
     if (it == by_path_.end()) return;  // check_entry_set says so
     if (!store_.is_folder())
-      findings_.require_equal(hex8(crc_of(bytes)), hex8(it->second->crc32), {"entry-crc", "K07"}, path,
-                              "CRC-32");
+      findings_.require_equal(fmt::format("{:08x}", crc_of(bytes)), fmt::format("{:08x}", it->second->crc32),
+                              {"entry-crc", "K07"}, path, "CRC-32");
     if (!store_.is_folder() && path != kManifestPath)
       findings_.require_equal(it->second->offset, offset, {"entry-set", "I08"}, path, "offset");
     findings_.require_equal(it->second->bytes, bytes.size(), {"entry-set", "I08"}, path, "bytes");
