@@ -7,6 +7,7 @@
 #include <algorithm>
 
 #include "format/base/descriptor.h"
+#include "format/base/text_bytes.h"
 #include "format/container/layout.h"
 
 namespace texmesh {
@@ -349,12 +350,8 @@ std::unique_ptr<ByteSource> memory_source(std::vector<std::uint8_t>&& bytes, std
 bool is_valid_entry_path(const std::string& path) {
   if (path == kContentCredentialPath) return true;
   if (path.empty() || path.size() > 200) return false;
-  for (std::size_t begin = 0; begin <= path.size();) {
-    const std::size_t end = std::min(path.find('/', begin), path.size());
-    const std::string part = path.substr(begin, end - begin);
+  for (const std::string_view part : pieces_of(path, '/'))
     if (part.empty() || part == "." || part == "..") return false;
-    begin = end + 1;
-  }
   return std::ranges::all_of(path, [](char c) {
     return (c >= 'a' && c <= 'z') || (c >= '0' && c <= '9') || c == '.' || c == '_' || c == '-' || c == '/';
   });

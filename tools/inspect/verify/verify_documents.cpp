@@ -9,6 +9,7 @@
 #include "pipeline/io/table.h"
 #include "stages/data/ladder.h"
 #include "stages/gltf/check_glb.h"
+#include "stages/gltf/glb_container.h"
 #include "stages/jpeg/jpeg.h"
 #include "tools/inspect/provenance.h"
 #include "tools/inspect/verify/verify_checks.h"
@@ -431,9 +432,7 @@ bool counts_part_names(const nlohmann::ordered_json& mesh) {
 
 void check_shared(const std::string& entry, std::span<const std::uint8_t> glb, MeshShare& share,
                   Findings& findings) {
-  const std::size_t bytes = glb[12] | glb[13] << 8 | glb[14] << 16 | std::size_t{glb[15]} << 24;
-  const auto json =
-      nlohmann::ordered_json::parse(glb.begin() + 20, glb.begin() + 20 + static_cast<std::ptrdiff_t>(bytes));
+  const nlohmann::ordered_json json = read_glb(glb, entry).root;
   const auto array = [&](const char* key) {
     return json.contains(key) ? json[key] : nlohmann::ordered_json::array();
   };

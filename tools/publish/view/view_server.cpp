@@ -11,6 +11,7 @@
 #include <nlohmann/json.hpp>
 
 #include "delivery/cpp/package/package_reader.h"
+#include "format/base/text_bytes.h"
 #include "format/container/layout.h"
 #include "pipeline/io/uri.h"
 
@@ -180,12 +181,9 @@ std::string etag_of(const struct stat& st) {
 /// The parts of a relative path; nothing where one of them is empty, hidden or leads upwards.
 std::optional<std::vector<std::string>> parts_of(const std::string& path) {
   std::vector<std::string> parts;
-  for (std::size_t begin = 0; begin <= path.size();) {
-    const std::size_t end = std::min(path.find('/', begin), path.size());
-    std::string part = path.substr(begin, end - begin);
-    if (part.empty() || part[0] == '.' || part.find('\0') != std::string::npos) return std::nullopt;
-    parts.push_back(std::move(part));
-    begin = end + 1;
+  for (const std::string_view part : pieces_of(path, '/')) {
+    if (part.empty() || part[0] == '.' || part.find('\0') != part.npos) return std::nullopt;
+    parts.emplace_back(part);
   }
   return parts;
 }
