@@ -21,10 +21,6 @@
 namespace texmesh {
 namespace {
 
-std::string plane_field(std::size_t plane, const std::string& member) {
-  return "plane " + std::to_string(plane) + ", " + member;
-}
-
 std::string shape_text(std::uint32_t width_px, std::uint32_t height_px, std::uint32_t channels) {
   return fmt::format("{} x {} px, {} channels", width_px, height_px, channels);
 }
@@ -128,50 +124,15 @@ void check_source_rung(const TextureInfo& texture, std::span<const std::span<con
       std::to_string(texture.fragment_width_px) + " x " + std::to_string(texture.fragment_height_px) + " px");
 }
 
-/// textures.json and tables.bin against the manifest and each other: counts, grids, rungs, entry sizes.
-void check_textures(const Manifest& m, const std::vector<TextureInfo>& textures, const PackageTables& tables,
-                    Findings& findings) {
-  findings.require_equal(m.plane_count, textures.size(), {"textures", "R04"}, kTexturesPath, "");
-  findings.require_equal(m.plane_count, tables.planes.size(), {"tables", "R04"}, kTablesPath, "planes");
+/// One plane for the colours and one for the alpha of an image at every size.
+void check_planes(const std::vector<TextureInfo>& textures, Findings& findings) {
   std::set<std::tuple<std::uint32_t, bool, std::uint32_t>> seen;
-  for (std::size_t k = 0; k < std::min(textures.size(), tables.planes.size()); ++k) {
-    const TextureInfo& info = textures[k];
-    const PlaneTables& t = tables.planes[k];
-    const std::string place = "/" + std::to_string(k);
-    findings.require(seen.insert({info.image, info.role == "alpha", info.mip}).second, {"textures", "X08"},
-                     kTexturesPath, place,
+  for (std::size_t k = 0; k < textures.size(); ++k)
+    findings.require(seen.insert({textures[k].image, textures[k].role == "alpha", textures[k].mip}).second,
+                     {"textures", "X08"}, kTexturesPath, "/" + std::to_string(k),
                      "one plane for the colours and one for the alpha of image " +
-                         std::to_string(info.image) + " at every size",
+                         std::to_string(textures[k].image) + " at every size",
                      "another");
-    findings.require(info.columns == t.columns && info.rows == t.rows, {"tables-grid", "R08"}, kTablesPath,
-                     plane_field(k, "grid"), std::to_string(info.columns) + " x " + std::to_string(info.rows),
-                     std::to_string(t.columns) + " x " + std::to_string(t.rows));
-    findings.require_equal(m.scales.size(), t.scale_count(), {"tables-scales", "R11"}, kTablesPath,
-                           plane_field(k, "scales"));
-    findings.require(std::equal(info.rung_quality.begin(), info.rung_quality.end(), t.rung_quality.begin(),
-                                t.rung_quality.end()) &&
-                         info.rungs.size() == info.rung_quality.size(),
-                     {"tables-rungs", "R09"}, kTablesPath, plane_field(k, "rungs"),
-                     std::to_string(info.rung_quality.size()) + " rungs of the qualities in textures.json",
-                     std::to_string(t.rung_quality.size()) + " rungs");
-    const CodecTraits& codec = codec_traits(info.codec);
-    findings.require(codec.incremental == t.incremental, {"tables-codec", "R10"}, kTablesPath,
-                     plane_field(k, "incremental"),
-                     codec.incremental ? "set, for codec " + std::string(codec.id) : "not set",
-                     "the opposite");
-    findings.require(
-        codec.required_feature.empty() ||
-            std::count(m.required_features.begin(), m.required_features.end(), codec.required_feature) > 0,
-        {"textures", "R05"}, kManifestPath, "/requiredFeatures", std::string(codec.required_feature),
-        "codec " + std::string(codec.id) + " without it");
-    findings.require_equal(sum(t.table_bytes), info.tables.bytes, {"tables-size", "R12"}, info.tables.path,
-                           "bytes");
-    for (std::size_t r = 0; r < std::min(info.rungs.size(), t.rung_count()); ++r) {
-      std::uint64_t bytes = 0;
-      for (std::size_t i = 0; i < t.fragment_count(); ++i) bytes += t.size_bytes[r * t.fragment_count() + i];
-      findings.require_equal(bytes, info.rungs[r].bytes, {"tables-size", "R13"}, info.rungs[r].path, "bytes");
-    }
-  }
 }
 
 /// One plane's tables in themselves: order, surface, covered texels.
@@ -633,7 +594,9 @@ class Verifier {
                        findings_);
     });
     if (!package_.textures || !package_.tables) return;
-    check_textures(package_.manifest, *package_.textures, *package_.tables, findings_);
+    check_planes(*package_.textures, findings_);
+    check_textures(package_.manifest, *package_.textures, findings_);
+    check_tables(package_.manifest, *package_.textures, *package_.tables, findings_);
     // Streams can be cut out of the packs only where grids and rungs agree.
     for (std::size_t k = 0; k < std::min(package_.textures->size(), package_.tables->planes.size()); ++k) {
       const TextureInfo& info = (*package_.textures)[k];
