@@ -12,6 +12,14 @@ namespace texmesh {
 using Bytes = std::vector<std::uint8_t>;
 using ByteSpan = std::span<const std::uint8_t>;
 
+/// The value whose bytes stand at a place, which need not be aligned.
+template <class T>
+T value_at(const std::uint8_t* at) {
+  T value;
+  std::memcpy(&value, at, sizeof value);
+  return value;
+}
+
 // Little-endian writing and bounded reading of the package's binary entries.
 
 /// Builds an entry.

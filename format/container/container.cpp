@@ -7,6 +7,7 @@
 #include <algorithm>
 
 #include "format/base/descriptor.h"
+#include "format/base/text_bytes.h"
 #include "format/container/layout.h"
 
 namespace texmesh {
@@ -332,11 +333,6 @@ void claim_path(const std::string& path, std::set<std::string>& paths, std::set<
     throw RuleError("K06", file, "entry " + path, "one entry of that path", "two");
 }
 
-std::uint32_t crc_of(std::uint32_t crc, std::span<const std::uint8_t> bytes) {
-  if (bytes.empty()) return crc;  // zlib takes a null pointer as a request to start over
-  return static_cast<std::uint32_t>(::crc32_z(crc, bytes.data(), bytes.size()));
-}
-
 }  // namespace
 
 std::unique_ptr<ByteSource> open_file_source(const std::string& path) {
@@ -354,12 +350,8 @@ std::unique_ptr<ByteSource> memory_source(std::vector<std::uint8_t>&& bytes, std
 bool is_valid_entry_path(const std::string& path) {
   if (path == kContentCredentialPath) return true;
   if (path.empty() || path.size() > 200) return false;
-  for (std::size_t begin = 0; begin <= path.size();) {
-    const std::size_t end = std::min(path.find('/', begin), path.size());
-    const std::string part = path.substr(begin, end - begin);
+  for (const std::string_view part : pieces_of(path, '/'))
     if (part.empty() || part == "." || part == "..") return false;
-    begin = end + 1;
-  }
   return std::ranges::all_of(path, [](char c) {
     return (c >= 'a' && c <= 'z') || (c >= '0' && c <= '9') || c == '.' || c == '_' || c == '-' || c == '/';
   });
@@ -381,7 +373,7 @@ void ContainerWriter::begin(const std::string& path, std::uint64_t bytes, std::u
 }
 
 void ContainerWriter::add(const std::string& path, std::span<const std::uint8_t> data) {
-  begin(path, data.size(), crc_of(0, data));
+  begin(path, data.size(), crc_of(data));
   write(data);
 }
 
@@ -391,7 +383,7 @@ void ContainerWriter::add(const std::string& path, std::uint64_t bytes, std::uin
   const std::uint64_t start = at_;
   std::uint32_t crc = 0;
   produce([&](std::span<const std::uint8_t> part) {
-    crc = crc_of(crc, part);
+    crc = crc_of(part, crc);
     write(part);
   });
   if (at_ - start != bytes)
@@ -450,17 +442,9 @@ std::vector<ContainerEntry> read_container(ByteSource& source) {
   return entries;
 }
 
-void check_crc(ByteSource& source, const ContainerEntry& entry) {
-  constexpr std::uint64_t kChunk = 1 << 20;
-  std::uint32_t crc = 0;
-  for (std::uint64_t done = 0; done < entry.bytes;) {
-    const std::uint64_t n = std::min(kChunk, entry.bytes - done);
-    crc = crc_of(crc, source.read(entry.offset + done, n));
-    done += n;
-  }
-  if (crc != entry.crc32)
-    throw RuleError("K07", source.name(), "entry " + entry.path, "CRC-32 " + std::to_string(entry.crc32),
-                    std::to_string(crc));
+std::uint32_t crc_of(std::span<const std::uint8_t> bytes, std::uint32_t before) {
+  if (bytes.empty()) return before;  // zlib takes a null pointer as a request to start over
+  return static_cast<std::uint32_t>(::crc32_z(before, bytes.data(), bytes.size()));
 }
 
 }  // namespace texmesh

@@ -65,11 +65,11 @@ class ContainerWriter {
 };
 
 /// Reads the central directory and checks every rule of the profile (local headers included, overlaps, gaps
-/// that are not alignment, trailing bytes); FormatError otherwise. Entries in file order.
+/// that are not alignment, trailing bytes); FormatError otherwise. Entries in file order; their data is not
+/// read.
 std::vector<ContainerEntry> read_container(ByteSource& source);
 
-/// Reads an entry's data and compares its CRC-32; FormatError when it differs. read_container itself
-/// reads no data.
-void check_crc(ByteSource& source, const ContainerEntry& entry);
+/// CRC-32 of bytes, behind others that have given `before`.
+std::uint32_t crc_of(std::span<const std::uint8_t> bytes, std::uint32_t before = 0);
 
 }  // namespace texmesh

@@ -1,11 +1,10 @@
 #include "format/documents/about.h"
 
 #include <algorithm>
-#include <nlohmann/json.hpp>
 
-#include "format/base/json_fields.h"
 #include "format/base/text_bytes.h"
 #include "format/container/layout.h"
+#include "format/documents/json_members.h"
 
 namespace texmesh {
 namespace {
@@ -14,8 +13,6 @@ using Json = nlohmann::ordered_json;
 
 const std::string kAboutFile = kAboutPath;
 constexpr double kLeastMetresPerUnit = 1e-12;
-constexpr const char* kIdentifierNames[2] = {"scheme", "value"};
-constexpr const char* kDateNames[2] = {"event", "text"};
 
 /// A field that is one text, and the most bytes of it.
 struct TextField {
@@ -35,56 +32,50 @@ constexpr TextField kTextFields[] = {
     {"capture", &About::capture, kMaxAboutTextBytes, false},
 };
 
-Json list_json(const std::vector<NamedText>& list, const char* const names[2]) {
-  Json json = Json::array();
-  for (const NamedText& item : list) json.push_back({{names[0], item.name}, {names[1], item.text}});
-  return json;
+void text_member(auto& v, const char* name, auto& text, std::size_t max_bytes) {
+  v.text(name, text, max_bytes);
+  v.check(name, !text.empty(), "a text", "an empty one");
 }
 
-Json about_json(const About& about) {
-  Json j = Json::object();
-  for (const TextField& f : kTextFields)
-    if (!(about.*f.member).empty()) j[f.name] = about.*f.member;
-  if (!about.identifiers.empty()) j["identifiers"] = list_json(about.identifiers, kIdentifierNames);
-  if (!about.dates.empty()) j["dates"] = list_json(about.dates, kDateNames);
-  if (about.metres_per_unit > 0) j["unit"] = {{"name", about.unit}, {"metres", about.metres_per_unit}};
-  if (!about.up_axis.empty()) j["upAxis"] = about.up_axis;
-  if (!about.crs.empty()) j["coordinateReference"]["text"] = about.crs;
-  if (about.epsg > 0) j["coordinateReference"]["epsg"] = about.epsg;
-  if (!about.source.empty()) j["source"] = Json::parse(about.source);
-  if (!about.extras.empty()) j["extras"] = Json::parse(about.extras);
-  return j;
+void list_member(auto& v, const char* list, auto& items, const char* name, const char* text) {
+  if (!v.has(list, !items.empty())) return;
+  v.list(list, items, 1, kMaxAboutList, [&](auto& inner, auto& item, std::size_t) {
+    text_member(inner, name, item.name, kMaxAboutNameBytes);
+    text_member(inner, text, item.text, kMaxAboutValueBytes);
+  });
 }
 
-std::string read_text(const JsonAt& at, std::size_t max_bytes) {
-  std::string text = at.text(max_bytes);
-  if (text.empty()) at.fail("a text", "an empty one");
-  return text;
-}
-
-std::vector<NamedText> read_list(const JsonAt& at, const char* const names[2]) {
-  std::vector<NamedText> list;
-  for (std::size_t i = 0, n = at.array(1, kMaxAboutList); i < n; ++i)
-    list.push_back(
-        {read_text(at[i][names[0]], kMaxAboutNameBytes), read_text(at[i][names[1]], kMaxAboutValueBytes)});
-  return list;
-}
-
-void read_coordinates(const JsonAt& at, About& about) {
-  if (at.has("unit")) {
-    about.unit = read_text(at["unit"]["name"], kMaxUnitNameBytes);
-    about.metres_per_unit = at["unit"]["metres"].number(kLeastMetresPerUnit, kMaxMetresPerUnit);
+void coordinate_members(auto& v, auto& about) {
+  if (v.has("unit", about.metres_per_unit > 0))
+    v.object("unit", [&](auto& unit) {
+      text_member(unit, "name", about.unit, kMaxUnitNameBytes);
+      unit.number("metres", about.metres_per_unit, kLeastMetresPerUnit, kMaxMetresPerUnit);
+    });
+  if (v.has("upAxis", !about.up_axis.empty())) {
+    v.text("upAxis", about.up_axis, 60);
+    v.check("upAxis", about.up_axis == "x" || about.up_axis == "y" || about.up_axis == "z", "x, y or z",
+            about.up_axis);
   }
-  if (at.has("upAxis")) {
-    about.up_axis = at["upAxis"].text(60);
-    if (about.up_axis != "x" && about.up_axis != "y" && about.up_axis != "z")
-      at["upAxis"].fail("x, y or z", about.up_axis);
+  if (!v.has("coordinateReference", !about.crs.empty() || about.epsg > 0)) return;
+  v.object("coordinateReference", [&](auto& reference) {
+    const bool text = reference.has("text", !about.crs.empty()), epsg = reference.has("epsg", about.epsg > 0);
+    v.check("coordinateReference", text || epsg, "text or epsg", "neither");
+    if (text) text_member(reference, "text", about.crs, kMaxAboutTextBytes);
+    if (epsg) reference.integer("epsg", about.epsg, 1, kMaxEpsgCode);
+  });
+}
+
+/// All but source and extras, which may be any JSON.
+void about_members(auto& v, auto& about) {
+  for (const TextField& f : kTextFields) {
+    auto& text = about.*f.member;
+    if (!v.has(f.name, !text.empty())) continue;
+    text_member(v, f.name, text, f.max_bytes);
+    if (f.is_url) v.by("B02").check(f.name, is_web_url(text), "an http or https URL", text);
   }
-  if (!at.has("coordinateReference")) return;
-  const JsonAt crs = at["coordinateReference"];
-  if (!crs.has("text") && !crs.has("epsg")) crs.fail("text or epsg", "neither");
-  if (crs.has("text")) about.crs = read_text(crs["text"], kMaxAboutTextBytes);
-  if (crs.has("epsg")) about.epsg = static_cast<std::uint32_t>(crs["epsg"].integer(1, kMaxEpsgCode));
+  list_member(v, "identifiers", about.identifiers, "scheme", "value");
+  list_member(v, "dates", about.dates, "event", "text");
+  coordinate_members(v, about);
 }
 
 std::string verbatim(const nlohmann::json& document, const JsonAt& at, const char* name,
@@ -102,7 +93,12 @@ std::string verbatim(const nlohmann::json& document, const JsonAt& at, const cha
 std::string write_about(const About& about) {
   std::string json;
   try {
-    json = dump_json(about_json(about), kAboutFile);
+    Json document = Json::object();
+    MemberWriter to(document);
+    about_members(to, about);
+    if (!about.source.empty()) document["source"] = Json::parse(about.source);
+    if (!about.extras.empty()) document["extras"] = Json::parse(about.extras);
+    json = dump_json(document, kAboutFile);
   } catch (const Json::parse_error&) {
     throw FormatError(kAboutFile, "/source", "JSON", "something else");
   }
@@ -114,15 +110,8 @@ About read_about(std::span<const std::uint8_t> json) {
   const nlohmann::json document = parse_json(json, kAboutFile, kMaxAboutBytes);
   const JsonAt at = JsonAt(document, kAboutFile).by("B01");
   About about;
-  for (const TextField& f : kTextFields) {
-    if (!at.has(f.name)) continue;
-    about.*f.member = read_text(at[f.name], f.max_bytes);
-    if (f.is_url && !is_web_url(about.*f.member))
-      at[f.name].by("B02").fail("an http or https URL", about.*f.member);
-  }
-  if (at.has("identifiers")) about.identifiers = read_list(at["identifiers"], kIdentifierNames);
-  if (at.has("dates")) about.dates = read_list(at["dates"], kDateNames);
-  read_coordinates(at, about);
+  const MemberReader from(at);
+  about_members(from, about);
   if (at.has("source") && !document["source"].is_object()) at["source"].fail("an object", "another type");
   about.source = verbatim(document, at, "source", kMaxAboutSourceBytes);
   about.extras = verbatim(document, at, "extras", kMaxAboutExtrasBytes);

@@ -7,6 +7,7 @@
 #include "format/base/text_bytes.h"
 #include "pipeline/about/source_fields.h"
 #include "pipeline/io/file_resolver.h"
+#include "pipeline/io/names/closest_word.h"
 
 namespace texmesh {
 namespace {
@@ -159,12 +160,7 @@ void read_voyager_texts(const Json& item, Annotation& note, Collector& to) {
                                          std::tuple("lead", "leads", &AnnotationText::text)}) {
     const Json& languages = member(item, list);
     for (const auto& [tag, value] : languages.items())
-      if (value.is_string()) {
-        std::string language = tag;
-        std::ranges::transform(language, language.begin(),
-                               [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-        to.text(note, language).*part = without_tags(value.get<std::string>());
-      }
+      if (value.is_string()) to.text(note, in_lower_case(tag)).*part = without_tags(value.get<std::string>());
     if (const std::string only = text_member(item, name); !only.empty() && languages.empty())
       to.text(note, kNoLanguage).*part = without_tags(only);
   }

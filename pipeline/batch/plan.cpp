@@ -16,6 +16,7 @@
 #include "pipeline/compile/options.h"
 #include "pipeline/import/archive/archive_files.h"
 #include "pipeline/io/file_resolver.h"
+#include "pipeline/io/names/closest_word.h"
 #include "pipeline/io/uri.h"
 
 namespace texmesh {
@@ -90,8 +91,8 @@ std::vector<std::string> model_paths(const std::string& folder, Notes* notes) {
   if (notes && !others.empty())
     notes->push_back({Severity::kWarning, "other-formats", folder,
                       fmt::format("{} of formats that texmesh does not read {} left out, {} among them",
-                                  others.size() == 1 ? "1 file" : fmt::format("{} files", others.size()),
-                                  others.size() == 1 ? "is" : "are", *std::ranges::min_element(others))});
+                                  counted(others.size(), "file"), others.size() == 1 ? "is" : "are",
+                                  *std::ranges::min_element(others))});
   if (notes && fs::exists(fs::path(folder) / kCollectionName, ec))
     notes->push_back({Severity::kWarning, "collection-not-read", folder,
                       fmt::format("its {0} is not read: compile {1} itself to use its titles and options",
@@ -103,9 +104,7 @@ std::vector<std::string> model_paths(const std::string& folder, Notes* notes) {
 std::string output_key(const std::string& output) {
   if (std::ranges::any_of(output, [](char c) { return static_cast<unsigned char>(c) >= 0x80; }))
     return name_key(output);
-  std::string key = output;  // in the place of a library's work for each of 100,000 names
-  for (char& c : key) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
-  return key;
+  return in_lower_case(output);  // in the place of a library's work for each of 100,000 names
 }
 
 /// The keys of outputs that more than one of the models have.

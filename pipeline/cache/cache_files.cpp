@@ -57,12 +57,7 @@ std::optional<Bytes> read_whole(const std::string& path, std::uint64_t max_bytes
       static_cast<std::uint64_t>(s.st_size) > max_bytes)
     return std::nullopt;
   Bytes bytes(static_cast<std::size_t>(s.st_size));
-  for (std::size_t at = 0; at < bytes.size();) {
-    const ssize_t n = ::read(d.get(), bytes.data() + at, bytes.size() - at);
-    if (n < 0 && errno == EINTR) continue;
-    if (n <= 0) return std::nullopt;  // EIO, or somebody shortens the file
-    at += static_cast<std::size_t>(n);
-  }
+  if (!read_at(d.get(), 0, bytes)) return std::nullopt;  // EIO, or somebody shortens the file
   return bytes;
 }
 

@@ -1,9 +1,9 @@
 #include "pipeline/import/mesh_builder.h"
 
-#include <numeric>
-
+#include "format/base/text_bytes.h"
 #include "pipeline/import/up_axis.h"
 #include "pipeline/io/table.h"
+#include "stages/geometry/mesh_topology.h"
 
 namespace texmesh {
 namespace {
@@ -26,11 +26,6 @@ std::uint32_t number_marked(std::vector<std::uint32_t>& marks) {
   return next;
 }
 
-/// "1 vertex", "2 vertices".
-std::string count_of(std::size_t n, const char* one, const char* many) {
-  return std::to_string(n) + " " + (n == 1 ? one : many);
-}
-
 /// Positions and wedges that no triangle needs, with a note; indices follow, here and below.
 void drop_unused_vertices(Model& model) {
   Mesh& mesh = model.mesh;
@@ -44,7 +39,7 @@ void drop_unused_vertices(Model& model) {
   if (wedges == wedge.size() && positions == position.size()) return;
   if (positions != position.size())
     add_info(model.notes, "unused-vertices", "",
-             count_of(position.size() - positions, "vertex", "vertices") + " of no triangle left out");
+             counted(position.size() - positions, "vertex", "vertices") + " of no triangle left out");
   keep_marked(mesh.uv0, wedge);
   keep_marked(mesh.uv1, wedge);
   keep_marked(mesh.normals, wedge);
@@ -125,19 +120,12 @@ Period period_of(const Material& material, int set) {
 
 /// Per wedge the lowest wedge of its chart.
 std::vector<std::uint32_t> charts_of(const Mesh& mesh) {
-  std::vector<std::uint32_t> chart(mesh.wedge_count());
-  std::iota(chart.begin(), chart.end(), 0u);
-  const auto root = [&chart](std::uint32_t w) {
-    while (chart[w] != w) w = chart[w] = chart[chart[w]];
-    return w;
-  };
+  DisjointSets charts(mesh.wedge_count());
   for (const Triangle& t : mesh.triangles)
-    for (std::size_t k = 1; k < 3; ++k) {
-      const std::uint32_t a = root(t[0]), b = root(t[k]);
-      chart[std::max(a, b)] = std::min(a, b);
-    }
-  for (std::uint32_t w = 0; w < chart.size(); ++w) chart[w] = root(w);
-  return chart;
+    for (std::size_t k = 1; k < 3; ++k) charts.join(t[0], t[k]);
+  std::vector<std::uint32_t> lowest(mesh.wedge_count());
+  for (std::uint32_t w = 0; w < lowest.size(); ++w) lowest[w] = charts.find(w);
+  return lowest;
 }
 
 void bring_near(const Model& model, const std::vector<std::uint32_t>& chart, int set,
@@ -264,7 +252,7 @@ void drop_non_finite_triangles(Model& model, const std::string& file_name) {
   if (!dropped) return;
   keep_triangles(mesh, [&](std::size_t t) { return good[t]; });
   add_warning(model.notes, "non-finite-position", file_name,
-              count_of(dropped, "triangle", "triangles") +
+              counted(dropped, "triangle") +
                   " left out because of positions that are NaN, infinite or beyond " +
                   shortest(kLargestCoordinate));
 }
@@ -277,9 +265,8 @@ void repair_uvs(Model& model, std::vector<Vec2f>& uvs, const std::string& file_n
       ++bad;
     }
   if (bad)
-    add_warning(
-        model.notes, "non-finite-uv", file_name,
-        count_of(bad, "texture coordinate", "texture coordinates") + " with NaN or infinity set to 0");
+    add_warning(model.notes, "non-finite-uv", file_name,
+                counted(bad, "texture coordinate") + " with NaN or infinity set to 0");
 }
 
 /// Normals become unit vectors. One that is NaN or 0 takes the sum of its triangles' area-weighted normals.
@@ -444,7 +431,7 @@ void drop_hidden_twins(Model& model, const std::string& file_name, Lost& lost) {
   if (twins.others() > 0)
     lost["triangles with another look behind one that shows both sides"] = twins.others();
   add_info(model.notes, "hidden-twin", "",
-           count_of(dropped, "triangle", "triangles") +
+           counted(dropped, "triangle") +
                " left out that are another one turned round, whose material shows both sides");
   keep_triangles(model.mesh, [&](std::size_t t) { return !hidden[t]; });
   drop_unused_vertices(model);

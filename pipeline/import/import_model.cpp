@@ -18,8 +18,7 @@ bool starts_with(std::span<const std::uint8_t> bytes, std::string_view magic) {
 // A binary STL has no magic, but its size follows from its count.
 bool is_binary_stl(std::span<const std::uint8_t> bytes) {
   if (bytes.size() < 84) return false;
-  std::uint32_t triangles;
-  std::memcpy(&triangles, bytes.data() + 80, 4);
+  const auto triangles = value_at<std::uint32_t>(bytes.data() + 80);
   return triangles > 0 && bytes.size() == 84 + std::uint64_t{50} * triangles;
 }
 
@@ -174,12 +173,6 @@ namespace {
 /// Draco gets below a byte a triangle.
 constexpr std::uint64_t kMostPerByte = 8;
 
-std::uint32_t word(std::span<const std::uint8_t> bytes, std::size_t at) {
-  std::uint32_t value = 0;
-  std::memcpy(&value, bytes.data() + at, 4);
-  return value;
-}
-
 std::uint64_t number(const nlohmann::json& object, const char* key, std::uint64_t otherwise) {
   const auto found = object.find(key);
   return found != object.end() && found->is_number_unsigned() ? found->get<std::uint64_t>() : otherwise;
@@ -197,11 +190,13 @@ std::uint64_t triangles_of_primitive(const nlohmann::json& primitive, const nloh
 }
 
 std::uint64_t triangles_of_glb(std::span<const std::uint8_t> bytes) {
-  if (bytes.size() < 20 || word(bytes, 12) > bytes.size() - 20) return 0;
-  const auto* text = reinterpret_cast<const char*>(bytes.data()) + 20;
-  const JsonShape shape = scan_json_shape(bytes.subspan(20, word(bytes, 12)), kMaxGltfJsonDepth);
+  if (bytes.size() < 20) return 0;
+  const auto json_bytes = value_at<std::uint32_t>(bytes.data() + 12);
+  if (json_bytes > bytes.size() - 20) return 0;
+  const ByteSpan json = bytes.subspan(20, json_bytes);
+  const JsonShape shape = scan_json_shape(json, kMaxGltfJsonDepth);
   if (shape.too_deep || shape.values > kMaxGltfJsonValues) return 0;
-  const nlohmann::json root = nlohmann::json::parse(text, text + word(bytes, 12), nullptr, false);
+  const nlohmann::json root = nlohmann::json::parse(json.begin(), json.end(), nullptr, false);
   if (!root.is_object() || !root.contains("meshes") || !root.contains("accessors") ||
       !root["meshes"].is_array() || !root["accessors"].is_array())
     return 0;
@@ -242,10 +237,7 @@ std::uint64_t said(const std::string& file_name, std::span<const std::uint8_t> b
   if (text.starts_with("glTF")) return triangles_of_glb(bytes);
   if (text.starts_with("ply")) return faces_of_ply(text);
   if (extension == "obj") return faces_of_obj(text);
-  constexpr std::uint64_t kStlHead = 84, kStlTriangle = 50;
-  if (bytes.size() >= kStlHead && bytes.size() == kStlHead + kStlTriangle * word(bytes, 80))
-    return word(bytes, 80);
-  return 0;
+  return is_binary_stl(bytes) ? value_at<std::uint32_t>(bytes.data() + 80) : 0;
 }
 
 }  // namespace

@@ -11,11 +11,7 @@ namespace {
 
 constexpr std::size_t kStlHeaderBytes = 84, kTriangleBytes = 50;
 
-std::uint32_t binary_count(std::span<const std::uint8_t> bytes) {
-  std::uint32_t n;
-  std::memcpy(&n, bytes.data() + 80, 4);
-  return n;
-}
+std::uint32_t binary_count(ByteSpan bytes) { return value_at<std::uint32_t>(bytes.data() + 80); }
 
 // Many binary files begin with "solid", so the size decides first; text decides where the size is wrong.
 bool is_binary(std::span<const std::uint8_t> bytes) {

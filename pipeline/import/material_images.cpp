@@ -10,16 +10,21 @@ namespace texmesh {
 
 namespace {
 
-/// An image of the model, or one white texel.
+struct ImageTexel {
+  const std::uint8_t* channel = nullptr;
+  std::uint32_t channels = 0;  // 1 grey, 2 grey + alpha, 3 RGB, 4 RGBA
+};
+
+/// An image of the model; for -1 one white texel.
 struct Plane {
   Pixels pixels{1, 1, 1, {255}};
   std::string name;
 
-  Plane(Model& model, CombinedImage from) {
-    if (from.index < 0) return;
-    const Image& image = model.images.at(static_cast<std::size_t>(from.index));
+  Plane(Model& model, std::int32_t index, FloatEncoding encoding) {
+    if (index < 0) return;
+    const Image& image = model.images.at(static_cast<std::size_t>(index));
     std::string damage;
-    pixels = decode_image(image, from.encoding, &damage);
+    pixels = decode_image(image, encoding, &damage);
     name = image.name;
     if (!damage.empty()) add_warning(model.notes, "damaged-image", name, damage_words(damage));
   }
@@ -31,6 +36,7 @@ struct Plane {
   }
 };
 
+/// `texel(a, b, to)` writes `channels` bytes from those of both images at one place.
 template <class Texel>
 std::int32_t combine(Model& model, const Plane& a, const Plane& b, std::uint32_t channels,
                      const Texel& texel) {
@@ -177,7 +183,7 @@ bool shows_normals(const Pixels& pixels, const SeenTexels& seen) {
 }  // namespace
 
 std::int32_t combine_alpha(Model& model, std::int32_t colour, std::int32_t alpha) {
-  const Plane a(model, {colour, FloatEncoding::kSrgb}), b(model, {alpha, FloatEncoding::kAsIs});
+  const Plane a(model, colour, FloatEncoding::kSrgb), b(model, alpha, FloatEncoding::kAsIs);
   const std::uint32_t last = b.pixels.channels - 1;
   bool own_alpha = false;  // of the second image: not all opaque
   for (std::size_t i = last; b.pixels.channels % 2 == 0 && i < b.pixels.data.size(); i += b.pixels.channels)
@@ -190,18 +196,12 @@ std::int32_t combine_alpha(Model& model, std::int32_t colour, std::int32_t alpha
 }
 
 std::int32_t combine_roughness_metallic(Model& model, std::int32_t roughness, std::int32_t metallic) {
-  return combine_images(model, {roughness, FloatEncoding::kAsIs}, {metallic, FloatEncoding::kAsIs}, 3,
-                        [](const ImageTexel& r, const ImageTexel& m, std::uint8_t* to) {
-                          to[0] = 255;  // occlusion: none
-                          to[1] = r.channel[0];
-                          to[2] = m.channel[0];
-                        });
-}
-
-std::int32_t combine_images(
-    Model& model, CombinedImage a, CombinedImage b, std::uint32_t channels,
-    const std::function<void(const ImageTexel& a, const ImageTexel& b, std::uint8_t* to)>& texel) {
-  return combine(model, Plane(model, a), Plane(model, b), channels, texel);
+  const Plane a(model, roughness, FloatEncoding::kAsIs), b(model, metallic, FloatEncoding::kAsIs);
+  return combine(model, a, b, 3, [](const ImageTexel& r, const ImageTexel& m, std::uint8_t* to) {
+    to[0] = 255;  // occlusion: none
+    to[1] = r.channel[0];
+    to[2] = m.channel[0];
+  });
 }
 
 namespace {
@@ -262,13 +262,12 @@ MetallicRoughness metallic_roughness_of(const SpecularGlossiness& point) {
 MetallicRoughnessImages convert_specular_glossiness(Model& model, const SpecularGlossinessImages& images,
                                                     const SpecularGlossiness& factors) {
   static const SampledCurve<4096> encode(srgb_of_light);
+  const Plane a(model, images.diffuse, FloatEncoding::kSrgb), b(model, images.specular, FloatEncoding::kSrgb);
   const auto combined = [&](std::uint32_t channels, auto&& texel) {
-    return combine_images(
-        model, {images.diffuse, FloatEncoding::kSrgb}, {images.specular, FloatEncoding::kSrgb}, channels,
-        [&](const ImageTexel& d, const ImageTexel& s, std::uint8_t* to) {
-          const Texel diffuse = texel_of(d.channel, d.channels), specular = texel_of(s.channel, s.channels);
-          texel(diffuse, converted(diffuse, specular, factors), to);
-        });
+    return combine(model, a, b, channels, [&](const ImageTexel& d, const ImageTexel& s, std::uint8_t* to) {
+      const Texel diffuse = texel_of(d.channel, d.channels), specular = texel_of(s.channel, s.channels);
+      texel(diffuse, converted(diffuse, specular, factors), to);
+    });
   };
   MetallicRoughnessImages out;
   out.base_colour = combined(4, [](const Texel& diffuse, const MetallicRoughness& m, std::uint8_t* to) {
@@ -287,31 +286,25 @@ SpecularGlossiness mean_of_specular(const Model& model, const TextureRef& textur
                                     const SpecularGlossiness& factors, const RunContext& context) {
   const Pixels pixels =
       decode_image(model.images.at(static_cast<std::size_t>(texture.image)), FloatEncoding::kSrgb);
-  const std::vector<bool> seen =
-      seen_texels(model, material, texture, pixels.width_px, pixels.height_px, context);
-  double sum[4] = {0, 0, 0, 0}, count = 0;
-  for (std::size_t i = 0; i < seen.size(); ++i) {
-    if (!seen[i]) continue;
-    const Texel t = texel_of(&pixels.data[i * pixels.channels], pixels.channels);
-    for (int k = 0; k < 3; ++k) sum[k] += static_cast<double>(t.light[k]);
-    sum[3] += static_cast<double>(t.alpha);
-    ++count;
-  }
-  SpecularGlossiness out = factors;
-  for (int k = 0; k < 3; ++k) out.specular[k] *= static_cast<float>(sum[k] / count);
-  out.glossiness *= static_cast<float>(sum[3] / count);
-  return out;
-}
-
-std::vector<bool> seen_texels(const Model& model, std::size_t material, const TextureRef& texture,
-                              std::uint32_t width_px, std::uint32_t height_px, const RunContext& context) {
   std::vector<std::uint32_t> triangles;
   for (std::uint32_t t = 0; t < model.mesh.triangles.size() && !uvs_of(model, texture).empty(); ++t)
     if (model.mesh.triangle_material[t] == material) triangles.push_back(t);
-  const SeenTexels seen = texels_of(model, triangles, texture, width_px, height_px, context);
-  std::vector<bool> out(std::size_t{width_px} * height_px);
-  for (std::size_t i = 0; i < out.size(); ++i) out[i] = seen.at(i);
-  if (std::find(out.begin(), out.end(), true) == out.end()) out.assign(out.size(), true);
+  const SeenTexels seen = texels_of(model, triangles, texture, pixels.width_px, pixels.height_px, context);
+  double sum[4] = {0, 0, 0, 0}, count = 0;
+  const auto add = [&](auto&& counts) {
+    for (std::size_t i = 0; i < std::size_t{pixels.width_px} * pixels.height_px; ++i) {
+      if (!counts(i)) continue;
+      const Texel t = texel_of(&pixels.data[i * pixels.channels], pixels.channels);
+      for (int k = 0; k < 3; ++k) sum[k] += static_cast<double>(t.light[k]);
+      sum[3] += static_cast<double>(t.alpha);
+      ++count;
+    }
+  };
+  add([&](std::size_t i) { return seen.at(i); });
+  if (count == 0) add([](std::size_t) { return true; });  // no triangle shows one, or has such coordinates
+  SpecularGlossiness out = factors;
+  for (int k = 0; k < 3; ++k) out.specular[k] *= static_cast<float>(sum[k] / count);
+  out.glossiness *= static_cast<float>(sum[3] / count);
   return out;
 }
 

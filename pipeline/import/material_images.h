@@ -10,19 +10,6 @@ namespace texmesh {
 // counts; the other image is sampled at the nearest texel. All add a PNG to model.images, where no equal one
 // stands yet, and return its index. Throw InputError when an image does not decode.
 
-struct CombinedImage {
-  std::int32_t index = -1;  // of Model::images; -1 = one white texel
-  FloatEncoding encoding = FloatEncoding::kAsIs;
-};
-struct ImageTexel {
-  const std::uint8_t* channel = nullptr;
-  std::uint32_t channels = 0;  // 1 grey, 2 grey + alpha, 3 RGB, 4 RGBA
-};
-/// `texel` writes `channels` bytes from those of both images at one place.
-std::int32_t combine_images(
-    Model& model, CombinedImage a, CombinedImage b, std::uint32_t channels,
-    const std::function<void(const ImageTexel& a, const ImageTexel& b, std::uint8_t* to)>& texel);
-
 /// `colour` with the first channel of `alpha` (its alpha where it has one that is used) as its alpha.
 std::int32_t combine_alpha(Model& model, std::int32_t colour, std::int32_t alpha);
 
@@ -74,10 +61,5 @@ void judge_alpha(Model& model, const RunContext& context);
 /// texels that triangles show are no normals, the texture is a height map and is left out, with a note.
 /// Before finish_model(), which drops pictures that nothing uses.
 void judge_bump_maps(Model& model, const std::vector<std::size_t>& materials, const RunContext& context);
-
-/// Which texels of a picture of this size triangles of the material show, row by row. All of them where none
-/// can be told: no triangle shows one, or the mesh has no such coordinates.
-std::vector<bool> seen_texels(const Model& model, std::size_t material, const TextureRef& texture,
-                              std::uint32_t width_px, std::uint32_t height_px, const RunContext& context);
 
 }  // namespace texmesh

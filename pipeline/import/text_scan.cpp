@@ -3,12 +3,11 @@
 #include <algorithm>
 #include <limits>
 
+#include "pipeline/io/names/closest_word.h"
 #include "pipeline/io/uri.h"
 
 namespace texmesh {
 namespace {
-
-char lower_char(char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; }
 
 // from_chars leaves the value alone when it is out of range: a huge one is infinite, a tiny one is 0.
 double out_of_range(std::string_view digits, bool negative) {
@@ -28,15 +27,10 @@ std::string_view trim(std::string_view s) {
 }
 
 bool same_word(std::string_view a, std::string_view b) {
-  return a.size() == b.size() && std::equal(a.begin(), a.end(), b.begin(),
-                                            [](char x, char y) { return lower_char(x) == lower_char(y); });
+  return std::ranges::equal(a, b, {}, lower_letter, lower_letter);
 }
 
-std::string lower(std::string_view s) {
-  std::string out(s);
-  for (char& c : out) c = lower_char(c);
-  return out;
-}
+std::string lower(std::string_view s) { return in_lower_case(std::string(s)); }
 
 std::string lower_extension(const std::string& file_name) {
   const std::size_t dot = file_name.find_last_of('.'), slash = file_name.find_last_of('/');

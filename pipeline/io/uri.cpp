@@ -8,6 +8,9 @@
 #include <cstdlib>
 #include <memory>
 
+#include "format/base/text_bytes.h"
+#include "pipeline/io/names/closest_word.h"
+
 namespace texmesh {
 namespace {
 
@@ -32,14 +35,9 @@ const char* why_refused(std::string_view name) {
   }
   if (name[0] == '/') return "the absolute name";
   if (has_scheme(name)) return "a scheme or drive letter in";
-  std::string_view last;
-  for (std::size_t at = 0; at <= name.size();) {
-    const std::size_t end = std::min(name.find('/', at), name.size());
-    last = name.substr(at, end - at);
-    if (last == "..") return "\"..\" in";
-    at = end + 1;
-  }
-  if (last.empty() || last == ".") return "the name of a folder";
+  const std::vector<std::string_view> parts = pieces_of(name, '/');
+  if (std::ranges::count(parts, "..") > 0) return "\"..\" in";
+  if (parts.back().empty() || parts.back() == ".") return "the name of a folder";
   return nullptr;
 }
 
@@ -270,9 +268,7 @@ std::string similar_key(std::string_view name) {
 std::string lower_ending(std::string_view path) {
   path.remove_prefix(path.rfind('/') + 1);
   const std::size_t dot = path.rfind('.');
-  std::string extension(dot == 0 || dot == path.npos ? "" : path.substr(dot));
-  for (char& c : extension) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
-  return extension;
+  return in_lower_case(std::string(dot == 0 || dot == path.npos ? "" : path.substr(dot)));
 }
 
 std::string to_wire(std::string_view bytes) {

@@ -4,6 +4,7 @@
 #include <numeric>
 #include <tuple>
 
+#include "format/base/text_bytes.h"
 #include "format/model/add_wedge.h"
 #include "stages/base/run_context.h"
 #include "stages/geometry/mesh_topology.h"
@@ -489,38 +490,34 @@ void number_components(ConditionedMesh& out) {
   out.report.components = out.component_count;
 }
 
-std::string count_of(std::uint64_t n, const char* what) {
-  return std::to_string(n) + " " + what + (n == 1 ? "" : "s");
-}
-
 Notes describe(const ConditionReport& r) {
   Notes notes;
   if (r.non_finite_triangles)
     add_warning(notes, "non-finite-position", "",
-                count_of(r.non_finite_triangles, "triangle") + " with a corner that is not finite dropped");
+                counted(r.non_finite_triangles, "triangle") + " with a corner that is not finite dropped");
   if (r.rounded_positions)
     add_info(notes, "rounded-position", "",
-             count_of(r.rounded_positions, "position") +
+             counted(r.rounded_positions, "position") +
                  " at open edges joined with a neighbour that differs by rounding alone");
   if (r.repaired_wedges)
     add_warning(notes, "bad-attribute", "",
-                count_of(r.repaired_wedges, "wedge") +
+                counted(r.repaired_wedges, "wedge") +
                     " with a UV, colour or normal that is not finite, or a normal of no length, repaired");
   if (r.degenerate_triangles)
     add_warning(notes, "degenerate-triangle", "",
-                count_of(r.degenerate_triangles, "triangle") + " without area dropped");
+                counted(r.degenerate_triangles, "triangle") + " without area dropped");
   if (r.duplicate_triangles)
     add_warning(notes, "duplicate-triangle", "",
-                count_of(r.duplicate_triangles, "triangle") + " that repeated another dropped");
+                counted(r.duplicate_triangles, "triangle") + " that repeated another dropped");
   if (r.slivers_kept)
     add_info(notes, "sliver", "",
-             count_of(r.slivers_kept, "triangle") + " without area kept, to leave no crack");
+             counted(r.slivers_kept, "triangle") + " without area kept, to leave no crack");
   if (r.split_non_manifold_edges)
     add_info(notes, "non-manifold-edge", "",
-             count_of(r.split_non_manifold_edges, "non-manifold edge") + " split");
+             counted(r.split_non_manifold_edges, "non-manifold edge") + " split");
   if (r.split_bow_ties)
     add_info(notes, "bow-tie", "",
-             count_of(r.split_bow_ties, "position") + " where surfaces touch in a point split");
+             counted(r.split_bow_ties, "position") + " where surfaces touch in a point split");
   return notes;
 }
 

@@ -6,16 +6,6 @@
 namespace texmesh {
 namespace {
 
-/// Square of the distance to the box; 0 inside.
-inline double box_distance2(const Box3d& box, Vec3d p) {
-  double sum = 0;
-  for (int k = 0; k < 3; ++k) {
-    const double d = std::max({box.min[k] - p[k], p[k] - box.max[k], 0.0});
-    sum += d * d;
-  }
-  return sum;
-}
-
 /// The corners of each side, so that cross(second - first, third - first) looks inwards.
 constexpr std::size_t kSides[4][3] = {{1, 3, 2}, {0, 2, 3}, {0, 3, 1}, {0, 1, 2}};
 
@@ -151,7 +141,7 @@ TriangleTree::TriangleTree(std::span<const Vec3d> points, std::span<const Triang
   for (std::size_t i = 0; i < order_.size(); ++i) place_[order_[i]] = static_cast<std::uint32_t>(i);
   // Children stand behind their parents, so one pass from the back fits all boxes.
   for (std::size_t n = nodes_.size(); n-- > 0;) {
-    Node& node = nodes_[n];
+    BoxNode& node = nodes_[n];
     for (std::uint32_t i = node.first; i < node.first + node.count; ++i)
       for (const Vec3d& p : corners_[i]) node.box.extend(p);
     if (node.count == 0)
@@ -178,7 +168,7 @@ std::uint32_t TriangleTree::add_quad(std::uint32_t node) {
   const auto index = static_cast<std::uint32_t>(quads_.size());
   quads_.emplace_back();
   for (std::size_t i = 0; i < count; ++i) {
-    const Node& n = nodes_[boxes[i]];
+    const BoxNode& n = nodes_[boxes[i]];
     const std::uint32_t first = n.count > 0 ? n.first : add_quad(boxes[i]);
     quads_[index].set(i, n.box, first, n.count);
   }
@@ -254,21 +244,13 @@ std::array<double, TriangleTree::kRays> TriangleTree::exits(Vec3d origin, const 
   RayBundle rays(origin, directions, box().diagonal());
   Vec3d along;
   for (const Vec3d& d : directions) along = along + d;
-  const auto ahead = [&](std::uint32_t node) { return dot(nodes_[node].box.centre() - origin, along); };
-  std::array<std::uint32_t, 40> stack{};
-  std::size_t depth = 1;
-  while (depth > 0) {
-    const std::uint32_t at = stack[--depth];
-    const Node& n = nodes_[at];
-    const unsigned met = rays.meets(n.box);
-    if (met == 0) continue;
-    for (std::uint32_t i = n.first; i < n.first + n.count; ++i) rays.try_triangle(corners_[i], met);
-    if (n.count > 0) continue;
-    std::uint32_t nearer = at + 1, farther = n.first;
-    if (ahead(farther) < ahead(nearer)) std::swap(nearer, farther);
-    stack[depth++] = farther;
-    stack[depth++] = nearer;
-  }
+  unsigned met = 0;
+  walk_boxes(
+      nodes_, [&](const Box3d& box) { return (met = rays.meets(box)) != 0; },
+      [&](const Box3d& box) { return dot(box.centre() - origin, along); },
+      [&](const BoxNode& n) {
+        for (std::uint32_t i = n.first; i < n.first + n.count; ++i) rays.try_triangle(corners_[i], met);
+      });
   return rays.best;
 }
 
@@ -280,25 +262,15 @@ struct TriangleTree::Found {
 TriangleTree::Found TriangleTree::search(Vec3d p, double limit2, std::uint64_t& tried) const {
   Found best;
   best.on.distance2 = limit2;
-  std::array<std::uint32_t, 40> stack{};
-  std::size_t depth = 1;
-  while (depth > 0) {
-    const std::uint32_t at = stack[--depth];
-    const Node& n = nodes_[at];
-    if (box_distance2(n.box, p) >= best.on.distance2) continue;
-    if (n.count > 0) {
-      tried += n.count;
-      for (std::uint32_t i = n.first; i < n.first + n.count; ++i)
-        if (const OnTriangle on = closest_on_triangle(corners_[i], p); on.distance2 < best.on.distance2)
-          best = {on, order_[i]};
-      continue;
-    }
-    std::uint32_t nearer = at + 1, farther = n.first;
-    if (box_distance2(nodes_[farther].box, p) < box_distance2(nodes_[nearer].box, p))
-      std::swap(nearer, farther);
-    stack[depth++] = farther;
-    stack[depth++] = nearer;
-  }
+  const auto distance = [&](const Box3d& box) { return box_distance2(box, p); };
+  walk_boxes(
+      nodes_, [&](const Box3d& box) { return !(distance(box) >= best.on.distance2); }, distance,
+      [&](const BoxNode& n) {
+        tried += n.count;
+        for (std::uint32_t i = n.first; i < n.first + n.count; ++i)
+          if (const OnTriangle on = closest_on_triangle(corners_[i], p); on.distance2 < best.on.distance2)
+            best = {on, order_[i]};
+      });
   return best;
 }
 
@@ -322,7 +294,7 @@ bool TriangleTree::meets(const Tetrahedron& solid, std::uint64_t& tried) const {
   std::size_t depth = 1;
   while (depth > 0) {
     const std::uint32_t at = stack[--depth];
-    const Node& n = nodes_[at];
+    const BoxNode& n = nodes_[at];
     if (!solid.may_meet_box(n.box)) continue;
     if (n.count == 0) {
       stack[depth++] = n.first;
@@ -409,7 +381,7 @@ std::optional<TriangleTree::Nearest> TriangleTree::nearest_facing(Vec3d p, const
   while (depth > 0) {
     const Ahead at = stack[--depth];
     if (at.distance2 > distance2) continue;
-    const Node& n = nodes_[at.node];
+    const BoxNode& n = nodes_[at.node];
     for (std::uint32_t i = n.first; i < n.first + n.count; ++i) {
       const OnTriangle on = closest_on_triangle(corners_[i], p);
       if (!(on.distance2 < distance2 || (on.distance2 == distance2 && best && order_[i] < best->triangle)) ||

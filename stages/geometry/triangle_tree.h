@@ -8,6 +8,7 @@
 #include <span>
 
 #include "format/model/model.h"
+#include "stages/geometry/box_tree.h"
 
 namespace texmesh {
 
@@ -162,10 +163,6 @@ class TriangleTree {
   const Box3d& box() const { return nodes_[0].box; }
 
  private:
-  struct Node {
-    Box3d box;
-    std::uint32_t first = 0, count = 0;  // triangles of a leaf; count 0: children at index + 1 and `first`
-  };
   struct Found;
   struct LineSearch;
   struct RayBundle;
@@ -176,7 +173,7 @@ class TriangleTree {
   std::vector<std::array<Vec3d, 3>> corners_;  // in the order of order_
   std::vector<std::uint32_t> order_;
   std::vector<std::uint32_t> place_;  // the reverse of order_
-  std::vector<Node> nodes_;
+  std::vector<BoxNode> nodes_;
   std::vector<BoxQuad> quads_;  // the same tree, four children a node
   double largest_ = 0;          // coordinate
 };

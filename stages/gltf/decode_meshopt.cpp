@@ -242,8 +242,7 @@ void decode_quaternion(std::uint8_t* at) {
 
 /// 8 bits of exponent and 24 of mantissa, both signed.
 void decode_exponential(std::uint8_t* at) {
-  std::uint32_t bits = 0;
-  std::memcpy(&bits, at, sizeof bits);
+  const auto bits = value_at<std::uint32_t>(at);
   const int mantissa = static_cast<std::int32_t>(bits << 8) >> 8;
   const int exponent = static_cast<std::int32_t>(bits) >> 24;
   const auto value = static_cast<float>(std::ldexp(static_cast<double>(mantissa), exponent));

@@ -18,12 +18,6 @@ constexpr std::array<std::string_view, 5> kReadExtensions{"KHR_draco_mesh_compre
                                                           "KHR_mesh_quantization", "EXT_meshopt_compression",
                                                           "KHR_texture_transform", "KHR_materials_unlit"};
 
-std::uint32_t read_u32(std::span<const std::uint8_t> bytes, std::size_t at) {
-  std::uint32_t v = 0;
-  std::memcpy(&v, bytes.data() + at, 4);
-  return v;
-}
-
 std::size_t bytes_of_component(std::uint64_t type) {
   constexpr std::array<std::uint8_t, 7> kBytes{1, 1, 2, 2, 0, 4, 4};
   return type >= 5120 && type - 5120 < kBytes.size() ? kBytes[type - 5120] : 0;
@@ -40,13 +34,6 @@ std::size_t components_of_type(const std::string& type) {
 std::string text_at(const Json& object, const char* key) {
   const auto it = object.find(key);
   return it != object.end() && it->is_string() ? it->get<std::string>() : std::string();
-}
-
-template <class T>
-T read_as(const std::uint8_t* p) {
-  T v;
-  std::memcpy(&v, p, sizeof v);
-  return v;
 }
 
 }  // namespace
@@ -124,11 +111,14 @@ bool GlbDocument::load_chunks() {
     return findings_.require(holds, "glb-container", entry_, field, expected, found);
   };
   if (!require(bytes_.size() >= 20, "", "at least 20 bytes", std::to_string(bytes_.size()))) return false;
-  if (!require(read_u32(bytes_, 0) == kGlbMagic, "byte 0", "\"glTF\"", "other bytes")) return false;
-  if (!require(read_u32(bytes_, 4) == 2, "byte 4", "version 2", std::to_string(read_u32(bytes_, 4))))
+  if (!require(value_at<std::uint32_t>(bytes_.data()) == kGlbMagic, "byte 0", "\"glTF\"", "other bytes"))
     return false;
-  if (!require(read_u32(bytes_, 8) == bytes_.size(), "byte 8", std::to_string(bytes_.size()) + " bytes",
-               std::to_string(read_u32(bytes_, 8))))
+  if (!require(value_at<std::uint32_t>(bytes_.data() + 4) == 2, "byte 4", "version 2",
+               std::to_string(value_at<std::uint32_t>(bytes_.data() + 4))))
+    return false;
+  if (!require(value_at<std::uint32_t>(bytes_.data() + 8) == bytes_.size(), "byte 8",
+               std::to_string(bytes_.size()) + " bytes",
+               std::to_string(value_at<std::uint32_t>(bytes_.data() + 8))))
     return false;
   std::size_t at = 12;
   for (int chunk = 0; at < bytes_.size(); ++chunk) {
@@ -136,7 +126,8 @@ bool GlbDocument::load_chunks() {
     if (!require(bytes_.size() - at >= 8, field, "a chunk header",
                  std::to_string(bytes_.size() - at) + " bytes"))
       return false;
-    const std::uint32_t length = read_u32(bytes_, at), type = read_u32(bytes_, at + 4);
+    const std::uint32_t length = value_at<std::uint32_t>(bytes_.data() + at),
+                        type = value_at<std::uint32_t>(bytes_.data() + at + 4);
     if (!require(length % 4 == 0 && length <= bytes_.size() - at - 8, field,
                  "a chunk of a multiple of 4 bytes that fits the file", std::to_string(length) + " bytes"))
       return false;
@@ -294,17 +285,17 @@ double GlbDocument::value(const Accessor& a, std::size_t i, std::size_t c) const
   };
   switch (a.component_type) {
     case 5120:
-      return scaled(read_as<std::int8_t>(p), 127);
+      return scaled(value_at<std::int8_t>(p), 127);
     case 5121:
-      return scaled(read_as<std::uint8_t>(p), 255);
+      return scaled(value_at<std::uint8_t>(p), 255);
     case 5122:
-      return scaled(read_as<std::int16_t>(p), 32767);
+      return scaled(value_at<std::int16_t>(p), 32767);
     case 5123:
-      return scaled(read_as<std::uint16_t>(p), 65535);
+      return scaled(value_at<std::uint16_t>(p), 65535);
     case 5125:
-      return read_as<std::uint32_t>(p);
+      return value_at<std::uint32_t>(p);
     default:
-      return read_as<float>(p);
+      return value_at<float>(p);
   }
 }
 

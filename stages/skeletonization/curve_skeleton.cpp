@@ -44,8 +44,6 @@ std::vector<Vec3d> directions_along(const CurveSkeleton& curve) {
 
 constexpr std::uint32_t kLeaf = 4;
 
-double square(double x) { return x * x; }
-
 double segment_distance_squared(Vec3d a, Vec3d b, Vec3d p) {
   const Vec3d along = b - a;
   const double l = dot(along, along), t = l > 0 ? std::clamp(dot(p - a, along) / l, 0.0, 1.0) : 0;
@@ -218,29 +216,14 @@ void SegmentTree::build(std::uint32_t first, std::uint32_t count) {
 }
 
 double SegmentTree::distance(Vec3d p) const {
-  const auto box_distance = [&](const Box3d& b) {
-    double sum = 0;
-    for (int k = 0; k < 3; ++k) sum += square(std::max({b.min[k] - p[k], 0.0, p[k] - b.max[k]}));
-    return sum;
-  };
-  double best = std::numeric_limits<double>::infinity();
-  // Halving 2^32 segments needs no more than 32 levels, each leaving one node behind.
-  std::array<std::uint32_t, 40> stack{};
-  std::size_t depth = 1;
-  while (depth > 0) {
-    const std::uint32_t at = stack[--depth];
-    const Node& n = nodes_[at];
-    if (box_distance(n.box) >= best) continue;
-    if (n.count > 0) {
-      for (std::uint32_t i = n.first; i < n.first + n.count; ++i)
-        best = std::min(best, segment_distance_squared(segments_[i].a, segments_[i].b, p));
-      continue;
-    }
-    std::uint32_t nearer = at + 1, farther = n.first;
-    if (box_distance(nodes_[farther].box) < box_distance(nodes_[nearer].box)) std::swap(nearer, farther);
-    stack[depth++] = farther;
-    stack[depth++] = nearer;
-  }
+  double best = kInfinity;
+  const auto box_distance = [&](const Box3d& box) { return box_distance2(box, p); };
+  walk_boxes(
+      nodes_, [&](const Box3d& box) { return !(box_distance(box) >= best); }, box_distance,
+      [&](const BoxNode& n) {
+        for (std::uint32_t i = n.first; i < n.first + n.count; ++i)
+          best = std::min(best, segment_distance_squared(segments_[i].a, segments_[i].b, p));
+      });
   return std::sqrt(best);
 }
 

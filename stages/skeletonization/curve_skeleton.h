@@ -1,6 +1,7 @@
 #pragma once
 // Inside the room only: a surface contracted to a curve, the curve put into the middle, distances to it.
 
+#include "stages/geometry/box_tree.h"
 #include "stages/geometry/triangle_tree.h"
 #include "stages/skeletonization/wrap.h"
 
@@ -46,15 +47,10 @@ class SegmentTree {
   struct Segment {
     Vec3d a, b;
   };
-  struct Node {
-    Box3d box;
-    // Of a leaf: its segments. An inner node has count 0 and its children at its index + 1 and at `first`.
-    std::uint32_t first, count;
-  };
   void build(std::uint32_t first, std::uint32_t count);
 
   std::vector<Segment> segments_;
-  std::vector<Node> nodes_;
+  std::vector<BoxNode> nodes_;
 };
 
 struct LocalRadiusOptions {

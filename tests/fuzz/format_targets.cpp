@@ -17,6 +17,7 @@
 #include "tests/format/documents/manifest_fixture.h"
 #include "tests/format/split/split_fixture.h"
 #include "tests/fuzz/fuzz_target.h"
+#include "tests/support/check_crc.h"
 
 namespace texmesh::fuzz {
 namespace {

@@ -8,6 +8,7 @@
 
 #include "delivery/cpp/package/package_reader.h"
 #include "format/container/container.h"
+#include "tests/support/check_crc.h"
 #include "tests/support/command.h"
 #include "tools/inspect/verify/verify.h"
 

@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
+#include "format/base/text_bytes.h"
 #include "pipeline/io/atomic_file.h"
 #include "pipeline/io/table.h"
 #include "stages/image/png_writer.h"
@@ -76,11 +77,8 @@ VerifyReport verify_path(const std::string& path, const RunContext& context) {
 void print_verified(const std::string& path, const VerifyReport& r, bool quiet) {
   for (const Finding& f : r.findings) std::cout << path << ": " << printable(to_string(f)) << '\n';
   if (quiet && r.findings.empty()) return;
-  std::cout << path << ": "
-            << (r.findings.empty()
-                    ? "ok"
-                    : std::to_string(r.findings.size()) + (r.findings.size() == 1 ? " finding" : " findings"))
-            << " (" << r.entries << " entries, " << grouped(r.bytes) << " bytes, " << r.meshes << " meshes, "
+  std::cout << path << ": " << (r.findings.empty() ? "ok" : counted(r.findings.size(), "finding")) << " ("
+            << r.entries << " entries, " << grouped(r.bytes) << " bytes, " << r.meshes << " meshes, "
             << r.previews << " previews, " << r.fragments << " fragments"
             << (r.notes ? "; notes: " + notes_words(*r.notes) : "")
             << (r.content_credential ? "; the content credential was not checked" : "") << ")\n";
@@ -317,9 +315,6 @@ void tell_rendered(const RenderArguments& args, const RenderedModel& model, cons
   double covered = 0;
   for (const SheetView& v : sheet.views) covered += v.covered_px;
   const double pixels = static_cast<double>(sheet.views.size()) * args.size_px * args.size_px;
-  const auto counted = [](std::size_t n, const char* word) {
-    return fmt::format("{} {}{}", n, word, n == 1 ? "" : "s");
-  };
   std::cout << fmt::format("{}: {}, {}, {} of {} px, {:.1f} % covered\n", last_name(args.output),
                            counted(model.mesh.triangles.size(), "triangle"),
                            counted(model.textures.size(), "texture"), counted(sheet.views.size(), "view"),

@@ -3,6 +3,7 @@
 #include <pthread.h>
 #include <signal.h>
 
+#include "format/base/text_bytes.h"
 #include "pipeline/io/atomic_file.h"
 #include "pipeline/io/file_resolver.h"
 #include "pipeline/io/table.h"
@@ -48,8 +49,8 @@ void announce(const ViewArguments& args, const ServedFiles& files, const std::st
     for (std::string& p : announced.packages) p = base + p;
     std::cout << to_json_line(announced) << std::endl;
   } else {
-    std::cout << page << "\nserving " << packages.size() << (packages.size() == 1 ? " package" : " packages")
-              << "; Ctrl-C ends it" << std::endl;
+    std::cout << page << "\nserving " << counted(packages.size(), "package") << "; Ctrl-C ends it"
+              << std::endl;
   }
   if (!args.open) return;
   if (::fork() == 0) {
@@ -284,8 +285,7 @@ int run_site(SiteArguments& args) {
   if (args.json)
     std::cout << to_json_line(SiteReport{page, site.objects, site.faults, site.stale}) << '\n';
   else
-    std::cout << page << ", " << site.objects.size()
-              << (site.objects.size() == 1 ? " object\n" : " objects\n");
+    std::cout << page << ", " << counted(site.objects.size(), "object") << '\n';
   return site.faults.empty() ? kExitOk : kExitModelFailed;
 }
 
@@ -316,14 +316,12 @@ std::uint32_t rung_of(const std::string& text, const std::string& flag) {
 
 std::vector<AskedBytes> asked_bytes(const std::string& list, const std::string& flag) {
   std::vector<AskedBytes> out;
-  for (std::size_t at = 0; at <= list.size() && !list.empty();) {
-    const std::size_t end = std::min(list.find(',', at), list.size());
-    AskedBytes one{list.substr(at, end - at), 0};
-    one.bytes = parse_some_bytes(one.text, flag);
-    if (std::ranges::find(out, one.text, &AskedBytes::text) != out.end())
+  if (list.empty()) return out;
+  for (const std::string_view piece : pieces_of(list, ',')) {
+    const std::string text(piece);
+    if (std::ranges::find(out, text, &AskedBytes::text) != out.end())
       throw UsageError(flag, "", "every number once", list);
-    out.push_back(std::move(one));
-    at = end + 1;
+    out.push_back({text, parse_some_bytes(text, flag)});
   }
   return out;
 }

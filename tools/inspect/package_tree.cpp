@@ -1,7 +1,5 @@
 #include "tools/inspect/package_tree.h"
 
-#include <zlib.h>
-
 #include <nlohmann/json.hpp>
 
 #include "format/base/bounded_json.h"
@@ -171,7 +169,7 @@ std::optional<Bytes> content_credential(PackageStore& store) {
     throw FormatError(it->path, "", "at most " + std::to_string(kMaxContentCredentialBytes) + " bytes",
                       std::to_string(it->bytes));
   Bytes bytes = store.read({it->path, it->offset, it->bytes, {}}, 0, it->bytes);
-  const auto crc = static_cast<std::uint32_t>(crc32_z(crc32_z(0, nullptr, 0), bytes.data(), bytes.size()));
+  const std::uint32_t crc = crc_of(bytes);
   if (!store.is_folder() && crc != it->crc32)
     throw FormatError(it->path, "CRC-32", std::to_string(it->crc32), std::to_string(crc));
   return bytes;

@@ -2,6 +2,8 @@
 
 #include <numeric>
 
+#include "delivery/cpp/package/package_rules.h"
+
 namespace texmesh {
 namespace {
 
@@ -37,6 +39,15 @@ PackageReader::PackageReader(std::unique_ptr<PackageStore> store) : store_(std::
 void PackageReader::refuse(const char* rule, const std::string& place, const std::string& expected,
                            const std::string& found) const {
   throw RuleError(rule, store_->name(), place, expected, found);
+}
+
+void PackageReader::require(const std::function<void(Findings&)>& check) const {
+  Findings findings;
+  check(findings);
+  if (findings.empty()) return;
+  const Finding& first = findings.list().front();
+  refuse(first.rule.c_str(), first.entry + (first.field.empty() ? "" : ", " + first.field), first.expected,
+         first.found);
 }
 
 Bytes PackageReader::entry(const EntryRef& ref) {
@@ -77,27 +88,7 @@ const std::vector<EntryRef>& PackageReader::index() {
   require_minor(kIndexPath, head.minor);
   require_head(manifest_.index, head.bytes);
   std::vector<EntryRef> entries = read_index(bytes);
-  const auto require_entry = [&](const EntryRef& ref) {
-    const auto it = std::ranges::find(entries, ref.path, &EntryRef::path);
-    if (it == entries.end() || !(*it == ref))
-      refuse("R03", "index entry " + ref.path, "what the manifest says of it",
-             it == entries.end() ? "none" : "another offset, size or digest");
-  };
-  for (const EntryRef& ref : {static_cast<EntryRef>(manifest_.tables), manifest_.textures, manifest_.quality,
-                              manifest_.provenance, manifest_.about})
-    require_entry(ref);
-  for (const ManifestScale& scale : manifest_.scales)
-    if (scale.has_glb()) require_entry(scale.glb);
-  for (const ManifestProxy& proxy : manifest_.proxies) require_entry(proxy.glb);
-  if (manifest_.thesis) require_entry(*manifest_.thesis);
-  if (manifest_.poster) require_entry(*manifest_.poster);
-  if (manifest_.annotations) require_entry(*manifest_.annotations);
-  if (manifest_.stream) {
-    const auto it = std::ranges::find(entries, std::string(kSplitStreamPath), &EntryRef::path);
-    if (it == entries.end() || it->offset != manifest_.stream->offset || it->bytes != manifest_.stream->bytes)
-      refuse("R03", std::string("index entry ") + kSplitStreamPath, "what the manifest says of it",
-             it == entries.end() ? "none" : "another place");
-  }
+  require([&](Findings& findings) { check_references(manifest_, entries, findings); });
   index_ = std::move(entries);
   return *index_;
 }
@@ -121,46 +112,10 @@ const EntryRef& PackageReader::find(const std::string& path) {
 const std::vector<TextureInfo>& PackageReader::textures() {
   if (textures_) return *textures_;
   std::vector<TextureInfo> textures = read_textures(entry(manifest_.textures));
-  if (textures.size() != manifest_.plane_count)
-    refuse("R04", kTexturesPath, std::to_string(manifest_.plane_count) + " planes",
-           std::to_string(textures.size()));
-  for (const TextureInfo& t : textures)
-    if (const auto feature = codec_traits(t.codec).required_feature;
-        !feature.empty() &&
-        std::ranges::find(manifest_.required_features, feature) == manifest_.required_features.end())
-      refuse("R05", "/requiredFeatures", std::string(feature), "a codec without it");
+  require([&](Findings& findings) { check_textures(manifest_, textures, findings); });
   resolve_textures(textures, index());
   textures_ = std::move(textures);
   return *textures_;
-}
-
-void PackageReader::check_plane(std::size_t plane, const PlaneTables& tables) {
-  const TextureInfo& texture = textures()[plane];
-  const bool same_rungs = std::ranges::equal(tables.rung_quality, texture.rung_quality, {},
-                                             [](std::uint8_t q) { return int{q}; });
-  if (tables.columns != texture.columns || tables.rows != texture.rows)
-    refuse("R08", plane_place(plane), "the grid of textures.json in tables.bin", "another");
-  if (!same_rungs) refuse("R09", plane_place(plane), "the rungs of textures.json in tables.bin", "others");
-  if (tables.scale_count() != manifest_.scales.size())
-    refuse("R11", plane_place(plane),
-           "a row in tables.bin for each of the manifest's " + std::to_string(manifest_.scales.size()) +
-               " scales",
-           std::to_string(tables.scale_count()));
-  if (tables.incremental != codec_traits(texture.codec).incremental)
-    refuse("R10", plane_place(plane), "tables of the codec in textures.json", "others");
-  const auto require_sum = [&](const char* rule, const EntryRef& ref, std::uint64_t sum) {
-    if (ref.bytes != sum)
-      refuse(rule, "entry " + ref.path, std::to_string(sum) + " bytes, as tables.bin adds up",
-             std::to_string(ref.bytes));
-  };
-  require_sum("R12", texture.tables,
-              std::accumulate(tables.table_bytes.begin(), tables.table_bytes.end(), std::uint64_t{0}));
-  const std::size_t fragments = tables.fragment_count();
-  for (std::size_t r = 0; r < tables.rung_count(); ++r) {
-    const auto begin = tables.size_bytes.begin() + static_cast<std::ptrdiff_t>(r * fragments);
-    require_sum("R13", texture.rungs[r],
-                std::accumulate(begin, begin + static_cast<std::ptrdiff_t>(fragments), std::uint64_t{0}));
-  }
 }
 
 const PackageTables& PackageReader::tables() {
@@ -174,13 +129,10 @@ const PackageTables& PackageReader::tables() {
   require_minor(kTablesPath, head.minor);
   require_head(manifest_.tables, head.bytes);
   PackageTables tables = read_tables(bytes);
-  if (tables.planes.size() != manifest_.plane_count)
-    refuse("R04", kTablesPath, std::to_string(manifest_.plane_count) + " planes",
-           std::to_string(tables.planes.size()));
+  require([&](Findings& findings) { check_tables(manifest_, textures(), tables, findings); });
   fragment_offsets_.clear();
   for (std::size_t p = 0; p < tables.planes.size(); ++p) {
     const PlaneTables& t = tables.planes[p];
-    check_plane(p, t);
     auto& offsets =
         fragment_offsets_.emplace_back(t.rung_count(), std::vector<std::uint64_t>(t.fragment_count(), 0));
     for (std::size_t r = 0; r < t.rung_count(); ++r) {
@@ -237,13 +189,7 @@ ThesisTables PackageReader::read_thesis_entry() {
 const QualityTable& PackageReader::quality() {
   if (quality_) return *quality_;
   QualityTable table = read_quality(entry(manifest_.quality));
-  const auto number_of = [](const ManifestScale& s) { return s.scale; };
-  if (!std::ranges::equal(table.scales, manifest_.scales, {}, {}, number_of))
-    refuse("R14", kQualityPath, "the manifest's scales", "others");
-  std::set<PlaneGroup> planes, found;
-  for (const TextureInfo& t : textures()) planes.insert(group_of(t.role));
-  for (const GroupLosses& g : table.groups) found.insert(g.group);
-  if (planes != found) refuse("R15", kQualityPath, "the groups of the planes in textures.json", "others");
+  require([&](Findings& findings) { check_scales_and_groups(manifest_, textures(), table, findings); });
   quality_ = std::move(table);
   return *quality_;
 }

@@ -1,4 +1,5 @@
 #pragma once
+#include <functional>
 #include <map>
 
 #include "format/container/container.h"
@@ -11,6 +12,8 @@
 #include "format/split/split_stream.h"
 
 namespace texmesh {
+
+class Findings;
 
 /// A rung beyond the last one stands for the last one.
 inline constexpr std::uint32_t kBestRung = 0xffffffffu;
@@ -101,12 +104,13 @@ class PackageReader {
  private:
   [[noreturn]] void refuse(const char* rule, const std::string& place, const std::string& expected,
                            const std::string& found) const;
+  /// Refuses the package by the first finding of a check.
+  void require(const std::function<void(Findings&)>& check) const;
   Bytes read_paged(const PagedRef& ref);
   void require_head(const PagedRef& ref, std::uint64_t head_bytes) const;
   void require_minor(const std::string& path, int minor) const;
   const ThesisTables* thesis();
   ThesisTables read_thesis_entry();
-  void check_plane(std::size_t plane, const PlaneTables& tables);
   const TextureInfo& texture(std::uint32_t plane);
   std::unique_ptr<PackageStore> store_;
   Manifest manifest_;

@@ -104,9 +104,9 @@ std::uint64_t check_of(ByteSpan bytes) { return truncated(sha256(bytes)); }
 /// The bytes behind a check that holds; none where it does not.
 ByteSpan checked(ByteSpan bytes) {
   if (bytes.size() < kCheckBytes) return {};
-  std::uint64_t check = 0;
-  std::memcpy(&check, bytes.data(), kCheckBytes);
-  return check == check_of(bytes.subspan(kCheckBytes)) ? bytes.subspan(kCheckBytes) : ByteSpan{};
+  return value_at<std::uint64_t>(bytes.data()) == check_of(bytes.subspan(kCheckBytes))
+             ? bytes.subspan(kCheckBytes)
+             : ByteSpan{};
 }
 
 void append_bytes(Bytes& to, const void* from, std::size_t size) {
@@ -115,10 +115,7 @@ void append_bytes(Bytes& to, const void* from, std::size_t size) {
 }
 
 BlockHead head_of(std::span<const std::uint8_t, kBlockHeadBytes> bytes) {
-  BlockHead head;
-  std::memcpy(&head.bytes, bytes.data(), 8);
-  std::memcpy(head.digest.data(), bytes.data() + 8, 32);
-  return head;
+  return {value_at<std::uint64_t>(bytes.data()), value_at<Sha256>(bytes.data() + 8)};
 }
 
 }  // namespace
@@ -256,9 +253,9 @@ std::optional<PackageMemo> MemoSegment::memo(const MemoEntry& entry) const {
 
 StageKeys MemoSegment::keys(const MemoEntry& entry) const {
   const ByteSpan bytes = look(memo_window_, entry.offset, entry.bytes);
-  MemoHead head;
-  if (bytes.size() >= kMemoHeadBytes && !checked(bytes).empty())
-    std::memcpy(&head, bytes.data(), kMemoHeadBytes);
+  const MemoHead head = bytes.size() >= kMemoHeadBytes && !checked(bytes).empty()
+                            ? value_at<MemoHead>(bytes.data())
+                            : MemoHead{};
   try {
     if (head.key_bytes > 0 && head.key_bytes <= kMostBlockBytes && head.keys_ahead <= kMostBlockBytes)
       return unpack_keys(checked(look(key_window_, entry.offset + head.keys_ahead, head.key_bytes)), stages_);
@@ -289,8 +286,7 @@ void MemoSegmentWriter::add(const MemoName& name, const PackageMemo& memo) {
 void MemoSegmentWriter::end_memos() {
   std::size_t at = 0;
   for (const std::uint32_t size : sizes_) {
-    MemoHead head;
-    std::memcpy(&head, memos_.data() + at, sizeof head);
+    auto head = value_at<MemoHead>(memos_.data() + at);
     head.keys_ahead += static_cast<std::uint32_t>(memos_.size() - at);
     std::memcpy(memos_.data() + at, &head, sizeof head);
     head.check = check_of(std::span(memos_).subspan(at + kCheckBytes, size - kCheckBytes));

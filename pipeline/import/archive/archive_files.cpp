@@ -2,6 +2,7 @@
 
 #include <zlib.h>
 
+#include "format/base/text_bytes.h"
 #include "pipeline/about/source_annotations.h"
 #include "pipeline/about/source_fields.h"
 #include "pipeline/import/text_scan.h"
@@ -81,12 +82,7 @@ void read_zip64(BytesIn extra, ArchivedFile& file) {
 
 bool leaves_archive(const std::string& name) {
   if (name.empty() || name.front() == '/' || (name.size() > 1 && name[1] == ':')) return true;
-  for (std::size_t at = 0; at <= name.size();) {
-    const std::size_t end = std::min(name.find('/', at), name.size());
-    if (name.substr(at, end - at) == "..") return true;
-    at = end + 1;
-  }
-  return name.find('\0') != name.npos;
+  return std::ranges::count(pieces_of(name, '/'), "..") > 0 || name.find('\0') != name.npos;
 }
 
 std::string archived_name(const std::string& name) { return name.substr(name.rfind('/') + 1); }
@@ -316,8 +312,7 @@ Bytes ArchiveFiles::unpacked(const ArchivedFile& file, std::uint64_t max_bytes) 
   else
     refuse_archive(*source_, place, "a file that is stored or deflated (unpack the archive first)",
                    "packing of kind " + std::to_string(file.method));
-  const auto step = [](uLong crc, ByteSpan bytes) { return crc32_z(crc, bytes.data(), bytes.size()); };
-  if (out.size() != file.bytes || (out.empty() ? 0 : step(0, out)) != file.crc32)
+  if (out.size() != file.bytes || crc_of(out) != file.crc32)
     refuse_archive(*source_, place, "the bytes that its size and CRC-32 say",
                    "others: the archive is damaged");
   return out;

@@ -111,48 +111,41 @@ ByteSpan Buffers::view(std::size_t index, const std::string& place) {
 
 namespace {
 
-template <class T>
-T load_component(const std::uint8_t* at) {
-  T v;
-  std::memcpy(&v, at, sizeof v);
-  return v;
-}
-
 std::uint32_t load_index(const std::uint8_t* at, int type) {
   switch (type) {
     case TINYGLTF_COMPONENT_TYPE_UNSIGNED_BYTE:
-      return load_component<std::uint8_t>(at);
+      return value_at<std::uint8_t>(at);
     case TINYGLTF_COMPONENT_TYPE_UNSIGNED_SHORT:
-      return load_component<std::uint16_t>(at);
+      return value_at<std::uint16_t>(at);
     default:
-      return load_component<std::uint32_t>(at);
+      return value_at<std::uint32_t>(at);
   }
 }
 
 float load_float(const std::uint8_t* at, int type, bool normalized) {
   switch (type) {
     case TINYGLTF_COMPONENT_TYPE_BYTE: {
-      const float v = load_component<std::int8_t>(at);
+      const float v = value_at<std::int8_t>(at);
       return normalized ? std::max(v / 127.0f, -1.0f) : v;
     }
     case TINYGLTF_COMPONENT_TYPE_UNSIGNED_BYTE: {
-      const float v = load_component<std::uint8_t>(at);
+      const float v = value_at<std::uint8_t>(at);
       return normalized ? v / 255.0f : v;
     }
     case TINYGLTF_COMPONENT_TYPE_SHORT: {
-      const float v = load_component<std::int16_t>(at);
+      const float v = value_at<std::int16_t>(at);
       return normalized ? std::max(v / 32767.0f, -1.0f) : v;
     }
     case TINYGLTF_COMPONENT_TYPE_UNSIGNED_SHORT: {
-      const float v = load_component<std::uint16_t>(at);
+      const float v = value_at<std::uint16_t>(at);
       return normalized ? v / 65535.0f : v;
     }
     case TINYGLTF_COMPONENT_TYPE_UNSIGNED_INT: {
-      const auto v = load_component<std::uint32_t>(at);
+      const auto v = value_at<std::uint32_t>(at);
       return normalized ? static_cast<float>(v / 4294967295.0) : static_cast<float>(v);
     }
     default:
-      return load_component<float>(at);
+      return value_at<float>(at);
   }
 }
 

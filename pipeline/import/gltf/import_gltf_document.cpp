@@ -20,11 +20,7 @@ namespace {
 
 constexpr std::size_t kHeaderBytes = 12, kChunkHeaderBytes = 8;
 
-std::uint32_t u32(ByteSpan bytes, std::size_t at) {
-  std::uint32_t v = 0;
-  std::memcpy(&v, bytes.data() + at, sizeof v);
-  return v;
-}
+std::uint32_t u32(ByteSpan bytes, std::size_t at) { return value_at<std::uint32_t>(bytes.data() + at); }
 
 }  // namespace
 

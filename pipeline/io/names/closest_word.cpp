@@ -10,8 +10,7 @@ constexpr std::size_t kMostLetters = 64;
 std::string letters_of(std::string_view word) {
   std::string letters;
   for (const char c : word.substr(0, kMostLetters))
-    if (c != ' ' && c != '-' && c != '_')
-      letters += c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
+    if (c != ' ' && c != '-' && c != '_') letters += lower_letter(c);
   return letters;
 }
 

@@ -68,43 +68,42 @@ std::vector<Refusal> refusals() {
       {"R2", "head of index.bin", sealed([](Manifest& m) { m.index.head_bytes = 16; })},
       {"R2", "head of index.bin", sealed([](Manifest& m) { m.index.head_digest[0] ^= 1; })},
       {"R2", "head of tables.bin", sealed([](Manifest& m) { m.tables.head_digest[0] ^= 1; })},
-      {"R3", "index entry tables.bin", sealed([=](Manifest& m) { other(m.tables); })},
-      {"R3", "index entry textures.json", sealed([=](Manifest& m) { other(m.textures); })},
-      {"R3", "index entry quality.json", sealed([=](Manifest& m) { other(m.quality); })},
-      {"R3", "index entry provenance.json", sealed([=](Manifest& m) { other(m.provenance); })},
-      {"R3", "index entry about.json", sealed([=](Manifest& m) { other(m.about); })},
-      {"R3", "index entry thesis.bin", sealed([=](Manifest& m) { other(*m.thesis); })},
-      {"R3", "index entry poster.jpg", sealed([=](Manifest& m) { other(*m.poster); })},
-      {"R3", "index entry mesh/s05.glb", sealed([=](Manifest& m) { other(m.scales[1].glb); })},
-      {"R3", "index entry mesh/s00.glb", sealed([](Manifest& m) { m.scales[0].glb.bytes += 1; })},
-      {"R3", "index entry mesh/stream.bin", sealed([](Manifest& m) { m.stream->offset += 64; })},
+      {"R3", "manifest.json, /tables", sealed([=](Manifest& m) { other(m.tables); })},
+      {"R3", "manifest.json, /textures", sealed([=](Manifest& m) { other(m.textures); })},
+      {"R3", "manifest.json, /quality", sealed([=](Manifest& m) { other(m.quality); })},
+      {"R3", "manifest.json, /provenance", sealed([=](Manifest& m) { other(m.provenance); })},
+      {"R3", "manifest.json, /about", sealed([=](Manifest& m) { other(m.about); })},
+      {"R3", "manifest.json, /thesis", sealed([=](Manifest& m) { other(*m.thesis); })},
+      {"R3", "manifest.json, /poster", sealed([=](Manifest& m) { other(*m.poster); })},
+      {"R3", "manifest.json, /scales/offset/1", sealed([=](Manifest& m) { other(m.scales[1].glb); })},
+      {"R3", "manifest.json, /scales/offset/0", sealed([](Manifest& m) { m.scales[0].glb.bytes += 1; })},
+      {"R3", "manifest.json, /stream", sealed([](Manifest& m) { m.stream->offset += 64; })},
       {"R4", "textures.json", sealed([](Manifest& m) { m.plane_count = 2; })},
       {"R4", "tables.bin", built([](PackageParts& p) { p.tables.planes.push_back(p.tables.planes[0]); })},
       {"R5", "codec-webp", built([](PackageParts& p) { p.textures[0].codec = Codec::kWebp; })},
       {"R7", "preview/000.jpg", renamed(preview_path(0), "preview/009.jpg")},
       {"R7", "texture/0/r01.pack", renamed(rung_path(0, 1), rung_path(0, 9))},
       {"R7", "texture/0/tables.pack", renamed(table_streams_path(0), "texture/0/tables_pack")},
-      {"R8", "the grid of textures.json", built([](PackageParts& p) {
+      {"R8", "plane 0, grid", built([](PackageParts& p) {
          p.textures[0].fragment_width_px = 64;
          p.textures[0].columns = 1;
        })},
-      {"R8", "the grid of textures.json", built([](PackageParts& p) {
+      {"R8", "plane 0, grid", built([](PackageParts& p) {
          p.textures[0].fragment_height_px = 48;
          p.textures[0].rows = 1;
        })},
-      {"R9", "the rungs of textures.json", built([](PackageParts& p) {
+      {"R9", "rungs of the qualities in textures.json", built([](PackageParts& p) {
          p.textures[0].rung_quality = {20, 71};
        })},
-      {"R10", "tables of the codec", built([](PackageParts& p) { p.tables.planes[0].incremental = true; })},
-      {"R11", "manifest's 2 scales", built([](PackageParts& p) { p.tables = select_scales(p.tables, {0}); })},
+      {"R10", "plane 0, incremental", built([](PackageParts& p) { p.tables.planes[0].incremental = true; })},
+      {"R11", "plane 0, scales", built([](PackageParts& p) { p.tables = select_scales(p.tables, {0}); })},
       {"R12", "tables.pack", built([](PackageParts& p) { p.tables.planes[0].table_bytes[1] += 1; })},
       {"R13", "r00.pack", built([](PackageParts& p) { p.tables.planes[0].size_bytes[0] += 1; })},
-      {"R14", "manifest's scales", built([](PackageParts& p) {
+      {"R14", "/scales", built([](PackageParts& p) {
          p.quality.scales = {0, 6};
        })},
-      {"R15", "groups of the planes", built([](PackageParts& p) { p.quality.groups.clear(); })},
-      {"R15", "groups of the planes",
-       built([](PackageParts& p) { p.quality.groups[0].group = PlaneGroup::kNormal; })},
+      {"R15", "/groups", built([](PackageParts& p) { p.quality.groups.clear(); })},
+      {"R15", "/groups", built([](PackageParts& p) { p.quality.groups[0].group = PlaneGroup::kNormal; })},
       {"R16", "planes of the package",
        built([](PackageParts& p) { p.thesis.planes.push_back(p.thesis.planes[0]); })},
       {"R16", "predictors of the plane's fragments", built([](PackageParts& p) {

@@ -1,6 +1,7 @@
 #include "format/container/container.h"
 #include "format/base/bytes.h"
 #include "format/base/errors.h"
+#include "tests/support/check_crc.h"
 
 #include <gtest/gtest.h>
 #include <sys/stat.h>

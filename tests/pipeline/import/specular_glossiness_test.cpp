@@ -6,6 +6,7 @@
 
 #include "stages/image/decode_image.h"
 #include "stages/image/png_writer.h"
+#include "stages/jpeg/jpeg.h"
 
 namespace texmesh::specular_glossiness_test {
 
@@ -60,6 +61,19 @@ TEST(SpecularGlossiness, ImagesOfTwoSizesBecomeOneOfTheLarger) {
   EXPECT_EQ(data.data[0], 255);
   EXPECT_EQ(data.data[1], 204);  // 1 - 51 / 255
   EXPECT_NEAR(data.data[2], 255, 1);
+}
+
+TEST(SpecularGlossiness, ADamagedPictureIsToldOnce) {
+  Pixels noise{64, 64, 3, Bytes(64 * 64 * 3)};
+  for (std::size_t i = 0; i < noise.data.size(); ++i) noise.data[i] = static_cast<std::uint8_t>(i * i / 7);
+  Bytes jpeg = encode_jpeg(noise, 90, Subsampling::k444);
+  jpeg.resize(jpeg.size() * 7 / 8);
+  Model model;
+  model.images.push_back(probe_image("image", std::move(jpeg), {}));
+  model.images[0].accept_damage = true;
+  convert_specular_glossiness(model, {0, -1}, {});
+  ASSERT_EQ(model.notes.size(), 1u);
+  EXPECT_EQ(model.notes[0].code, "damaged-image");
 }
 
 TEST(SpecularGlossiness, MeansOfATexture) {

@@ -6,6 +6,7 @@
 
 #include "format/base/text_bytes.h"
 #include "pipeline/compile/stage_table.h"
+#include "pipeline/io/names/closest_word.h"
 #include "pipeline/io/table.h"
 #include "tools/inspect/provenance.h"
 
@@ -117,8 +118,7 @@ void compare_entries(PackageReader& a, PackageReader& b, PackageDiff& diff) {
 
 bool is_image(const std::string& uri) {
   const auto dot = uri.find_last_of('.');
-  std::string extension = dot == std::string::npos ? "" : uri.substr(dot + 1);
-  for (char& c : extension) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
+  const std::string extension = in_lower_case(dot == std::string::npos ? "" : uri.substr(dot + 1));
   // What can hold a mesh or materials; anything else that a model names is an image.
   static const std::set<std::string> others{"", "bin", "mtl", "glbin", "gltf", "glb"};
   return !others.contains(extension);

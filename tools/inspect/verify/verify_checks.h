@@ -1,7 +1,6 @@
 #pragma once
 
-#include "delivery/cpp/package/package_reader.h"
-#include "format/base/finding.h"
+#include "delivery/cpp/package/package_rules.h"
 #include "stages/base/run_context.h"
 
 namespace texmesh {
@@ -14,9 +13,6 @@ struct Provenance;
 /// Figures of the manifest that must agree: bounds, object height, scales from fine to coarse,
 /// the step function.
 void check_manifest(const Manifest& manifest, Findings& findings);
-
-/// Every place that the manifest names (offset, bytes, digest) is where the index has it.
-void check_references(const Manifest& manifest, const std::vector<EntryRef>& index, Findings& findings);
 
 /// thesis.bin against what tables.bin says of the scales that are stored: fragments, Q_i, D_i(Gamma).
 void check_thesis(const Manifest& manifest, const PackageTables& tables, const ThesisTables& thesis,

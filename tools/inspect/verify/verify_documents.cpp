@@ -9,6 +9,7 @@
 #include "pipeline/io/table.h"
 #include "stages/data/ladder.h"
 #include "stages/gltf/check_glb.h"
+#include "stages/gltf/glb_container.h"
 #include "stages/jpeg/jpeg.h"
 #include "tools/inspect/provenance.h"
 #include "tools/inspect/verify/verify_checks.h"
@@ -25,11 +26,6 @@ bool near(double a, double b, double relative) {
 }
 
 std::string number(double v) { return shortest(v, 9); }
-
-std::string text_of(const EntryRef& e) {
-  return std::to_string(e.bytes) + " bytes at " + std::to_string(e.offset) + ", " +
-         to_hex(e.digest).substr(0, 16) + "...";
-}
 
 void require_six_digits(double value, const std::string& field, Findings& findings) {
   findings.require(six_digits(value) == value, {"manifest", "M07"}, kManifestPath, field,
@@ -122,41 +118,6 @@ void check_manifest(const Manifest& m, Findings& findings) {
   check_steps(m, findings);
 }
 
-void check_references(const Manifest& m, const std::vector<EntryRef>& index, Findings& findings) {
-  std::map<std::string, const EntryRef*> entries;
-  for (const EntryRef& e : index) entries[e.path] = &e;
-  const auto check = [&](const EntryRef& ref, const std::string& field) {
-    const auto it = entries.find(ref.path);
-    if (it == entries.end())
-      findings.add({"reference", "R03"}, kManifestPath, field, "an entry " + ref.path, "none in the index");
-    else
-      findings.require(*it->second == ref, {"reference", "R03"}, kManifestPath, field,
-                       text_of(*it->second) + " as in the index", text_of(ref));
-  };
-  check(m.tables, "/tables");
-  check(m.textures, "/textures");
-  check(m.quality, "/quality");
-  check(m.provenance, "/provenance");
-  check(m.about, "/about");
-  if (m.stream) {
-    const auto it = entries.find(kSplitStreamPath);
-    if (it == entries.end())
-      findings.add({"reference", "R03"}, kManifestPath, "/stream",
-                   std::string("an entry ") + kSplitStreamPath, "none in the index");
-    else
-      findings.require(it->second->offset == m.stream->offset && it->second->bytes == m.stream->bytes,
-                       {"reference", "R03"}, kManifestPath, "/stream",
-                       text_of(*it->second) + " as in the index",
-                       std::to_string(m.stream->bytes) + " bytes at " + std::to_string(m.stream->offset));
-  }
-  if (m.thesis) check(*m.thesis, "/thesis");
-  if (m.poster) check(*m.poster, "/poster");
-  if (m.annotations) check(*m.annotations, "/annotations");
-  for (std::size_t k = 0; k < m.proxies.size(); ++k) check(m.proxies[k].glb, at("proxies/offset", k));
-  for (std::size_t k = 0; k < m.scales.size(); ++k)
-    if (m.scales[k].has_glb()) check(m.scales[k].glb, at("scales/offset", k));
-}
-
 void check_about(const Manifest& m, const About& about, Findings& findings) {
   findings.require_equal(about.title, m.title, {"about", "B03"}, kManifestPath, "/title");
 }
@@ -185,17 +146,7 @@ static void check_geometry(const QualityTable& q, Findings& findings) {
 
 void check_quality(const Manifest& m, const std::vector<TextureInfo>& textures, const QualityTable& q,
                    Findings& findings) {
-  std::vector<int> kept;
-  for (const ManifestScale& s : m.scales) kept.push_back(s.scale);
-  findings.require(q.scales == kept, {"quality", "R14"}, kQualityPath, "/scales", "the scales of the package",
-                   std::to_string(q.scales.size()) + " others or in another order");
-  std::set<PlaneGroup> groups;
-  for (const TextureInfo& t : textures) groups.insert(group_of(t.role));
-  std::set<PlaneGroup> found;
-  for (const GroupLosses& group : q.groups) found.insert(group.group);
-  findings.require(groups == found, {"quality", "R15"}, kQualityPath, "/groups",
-                   "the groups that the planes have",
-                   std::to_string(found.size()) + " of " + std::to_string(groups.size()) + ", or others");
+  check_scales_and_groups(m, textures, q, findings);
   check_geometry(q, findings);
   check_switch_sizes(m, q, findings);
 }
@@ -431,9 +382,7 @@ bool counts_part_names(const nlohmann::ordered_json& mesh) {
 
 void check_shared(const std::string& entry, std::span<const std::uint8_t> glb, MeshShare& share,
                   Findings& findings) {
-  const std::size_t bytes = glb[12] | glb[13] << 8 | glb[14] << 16 | std::size_t{glb[15]} << 24;
-  const auto json =
-      nlohmann::ordered_json::parse(glb.begin() + 20, glb.begin() + 20 + static_cast<std::ptrdiff_t>(bytes));
+  const nlohmann::ordered_json json = read_glb(glb, entry).root;
   const auto array = [&](const char* key) {
     return json.contains(key) ? json[key] : nlohmann::ordered_json::array();
   };

@@ -454,12 +454,8 @@ std::string viewer_list(const Site& site) {
 std::string object_name(const std::string& path) {
   const std::string key = name_key(without_ending(path));
   std::string name;
-  for (std::size_t begin = 0; begin <= key.size();) {
-    const std::size_t end = std::min(key.find('/', begin), key.size());
-    name += (begin > 0 ? "/" : "") + file_name_of(key.substr(begin, end - begin));
-    begin = end + 1;
-  }
-  return name;
+  for (const std::string_view part : pieces_of(key, '/')) name += "/" + file_name_of(std::string(part));
+  return name.substr(1);
 }
 
 Site read_site(const std::string& packages, const SiteOptions& options) {

@@ -28,11 +28,7 @@ void add_text(std::set<std::string>& to, const std::string& text) {
 /// Each part of a text between separators.
 std::set<std::string> listed_texts(const std::string& text, char separator) {
   std::set<std::string> parts;
-  for (std::size_t begin = 0; begin <= text.size();) {
-    const std::size_t end = std::min(text.find(separator, begin), text.size());
-    add_text(parts, text.substr(begin, end - begin));
-    begin = end + 1;
-  }
+  for (const std::string_view part : pieces_of(text, separator)) add_text(parts, std::string(part));
   return parts;
 }
 

@@ -4,17 +4,15 @@
 
 #include <fcntl.h>
 #include <sys/stat.h>
-#include <unistd.h>
 #include <algorithm>
 #include <cerrno>
-#include <charconv>
 #include <cstring>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
-#include "format/container/container.h"
+#include "delivery/cpp/package/package_reader.h"
+#include "format/base/text_bytes.h"
 #include "format/container/layout.h"
-#include "format/documents/manifest.h"
 #include "pipeline/io/uri.h"
 
 namespace texmesh {
@@ -25,64 +23,29 @@ constexpr std::size_t kThreads = 64;  // each open connection holds one, and bro
 constexpr std::size_t kChunkBytes = 64 << 10;
 constexpr std::string_view kPosters = "/posters/";
 
-constexpr std::uint64_t kManifestOffset = 64;  // of the data in a container (SPEC.md, section 2)
+namespace fs = std::filesystem;
 
-std::vector<std::uint8_t> read_part(const ServedFile& file, std::uint64_t offset, std::uint64_t bytes) {
-  std::vector<std::uint8_t> out(static_cast<std::size_t>(bytes));
-  std::size_t at = 0;
-  while (at < out.size()) {
-    const std::size_t n = file.read(offset + at, reinterpret_cast<char*>(out.data()) + at, out.size() - at);
-    if (n == 0) break;
-    at += n;
-  }
-  out.resize(at);
-  return out;
-}
-
-/// Of the container's first bytes, or of a tree's file.
-std::optional<Manifest> manifest_of(const ServedFiles& files, const std::string& path) {
+/// A package of `files`; nothing where none can be read.
+std::unique_ptr<PackageReader> package_at(const ServedFiles& files, const std::string& path) try {
   const bool tree = path.ends_with("/");
   const auto file = files.open(tree ? path + kManifestPath : path);
-  if (!file) return std::nullopt;
-  std::vector<std::uint8_t> bytes = read_part(*file, 0, std::min(file->bytes(), kBootstrapBytes));
-  if (!tree) {
-    if (bytes.size() < kManifestOffset) return std::nullopt;
-    std::uint64_t length = 0;
-    for (int i = 3; i >= 0; --i) length = length << 8 | bytes[static_cast<std::size_t>(22 + i)];
-    bytes.erase(bytes.begin(), bytes.begin() + kManifestOffset);
-    if (length > bytes.size()) return std::nullopt;
-    bytes.resize(static_cast<std::size_t>(length));
-  }
-  try {
-    return read_manifest(bytes);
-  } catch (const FormatError&) {
-    return std::nullopt;
-  }
-}
-
-std::string decoded(const std::string& url) {
-  const auto digit = [](char c) { return c <= '9' ? c - '0' : c - 'A' + 10; };
-  std::string out;
-  for (std::size_t i = 0; i < url.size(); ++i)
-    if (url[i] == '%' && i + 2 < url.size()) {
-      out += static_cast<char>(16 * digit(url[i + 1]) + digit(url[i + 2]));
-      i += 2;
-    } else {
-      out += url[i];
-    }
-  return out;
+  if (!file) return nullptr;
+  const std::string opened = "/proc/self/fd/" + std::to_string(file->fd.get());
+  std::error_code error;
+  return std::make_unique<PackageReader>(
+      tree ? open_folder(fs::read_symlink(opened, error).parent_path().string())
+           : open_container(open_file_source(opened)));
+} catch (const Error&) {
+  return nullptr;
 }
 
 /// The package's poster, a JPEG, its digest checked; nothing where there is none.
-std::optional<std::vector<std::uint8_t>> package_poster(const ServedFiles& files, const std::string& path) {
-  const std::optional<Manifest> m = manifest_of(files, path);
-  if (!m || !m->poster) return std::nullopt;
-  const bool tree = path.ends_with("/");
-  const auto file = files.open(tree ? path + kPosterPath : path);
-  if (!file) return std::nullopt;
-  std::vector<std::uint8_t> bytes = read_part(*file, tree ? 0 : m->poster->offset, m->poster->bytes);
-  if (bytes.size() != m->poster->bytes || sha256(bytes) != m->poster->digest) return std::nullopt;
-  return bytes;
+std::optional<Bytes> package_poster(const ServedFiles& files, const std::string& path) try {
+  const auto package = package_at(files, path);
+  if (!package || !package->manifest().poster) return std::nullopt;
+  return package->entry(*package->manifest().poster);
+} catch (const Error&) {
+  return std::nullopt;
 }
 
 /// By the names of the files. Of a package that cannot be read the viewer shows the name.
@@ -90,17 +53,11 @@ std::string package_list(const ServedFiles& files) {
   constexpr std::string_view kPackages = "packages/";
   PackageList list;
   for (const std::string& url : files.packages()) {
-    const std::optional<Manifest> m = manifest_of(files, "/" + decoded(url));
-    const bool poster = m && m->poster;
-    list.packages.push_back(
-        {url, m ? m->title : "", poster ? "posters/" + url.substr(kPackages.size()) : ""});
+    const auto package = package_at(files, "/" + percent_decoded(url));
+    const Manifest none, &m = package ? package->manifest() : none;
+    list.packages.push_back({url, m.title, m.poster ? "posters/" + url.substr(kPackages.size()) : ""});
   }
   return to_json_line(list);
-}
-
-bool parse_number(std::string_view text, std::uint64_t& value) {
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  return error == std::errc() && end == text.data() + text.size();
 }
 
 void plain_answer(httplib::Response& response, int status, const std::string& text) {
@@ -121,34 +78,36 @@ bool lists_tag(const std::string& header, const std::string& etag) {
 
 void send_file(ServedFile opened, const httplib::Request& request, httplib::Response& response) {
   const auto file = std::make_shared<ServedFile>(std::move(opened));
-  response.set_header("ETag", file->etag());
+  response.set_header("ETag", file->etag);
   response.set_header("Accept-Ranges", "bytes");
-  if (lists_tag(request.get_header_value("If-None-Match"), file->etag())) {
+  if (lists_tag(request.get_header_value("If-None-Match"), file->etag)) {
     response.status = 304;
     return;
   }
   const std::string if_range = request.get_header_value("If-Range");
-  const bool ranged = if_range.empty() || if_range == file->etag();
+  const bool ranged = if_range.empty() || if_range == file->etag;
   const RequestedRange range =
-      ranged ? requested_range(request.get_header_value("Range"), file->bytes()) : RequestedRange{};
+      ranged ? requested_range(request.get_header_value("Range"), file->bytes) : RequestedRange{};
   if (range.kind == RequestedRange::kUnsatisfiable) {
-    response.set_header("Content-Range", "bytes */" + std::to_string(file->bytes()));
-    return plain_answer(response, 416, "the file has " + std::to_string(file->bytes()) + " bytes\n");
+    response.set_header("Content-Range", "bytes */" + std::to_string(file->bytes));
+    return plain_answer(response, 416, "the file has " + std::to_string(file->bytes) + " bytes\n");
   }
   const bool part = range.kind == RequestedRange::kPart;
-  const std::uint64_t first = part ? range.first : 0, bytes = part ? range.bytes : file->bytes();
+  const std::uint64_t first = part ? range.first : 0, bytes = part ? range.bytes : file->bytes;
   response.status = part ? 206 : 200;
   if (part)
     response.set_header("Content-Range", "bytes " + std::to_string(first) + "-" +
                                              std::to_string(first + bytes - 1) + "/" +
-                                             std::to_string(file->bytes()));
-  if (bytes == 0) return response.set_content("", file->type());
+                                             std::to_string(file->bytes));
+  if (bytes == 0) return response.set_content("", file->type);
   response.set_content_provider(
-      static_cast<std::size_t>(bytes), file->type(),
+      static_cast<std::size_t>(bytes), file->type,
       [file, first](std::size_t offset, std::size_t length, httplib::DataSink& sink) {
-        char buffer[kChunkBytes];
-        const std::size_t n = file->read(first + offset, buffer, std::min(length, kChunkBytes));
-        return n > 0 && sink.write(buffer, n);  // a file that became shorter ends the connection
+        std::uint8_t buffer[kChunkBytes];
+        const auto part = std::span(buffer).first(std::min(length, kChunkBytes));
+        // A file that became shorter ends the connection.
+        return read_at(file->fd.get(), first + offset, part) &&
+               sink.write(reinterpret_cast<const char*>(part.data()), part.size());
       });
 }
 
@@ -179,8 +138,6 @@ void respond(const ServedFiles& files, const httplib::Request& request, httplib:
   if (!file) return plain_answer(response, 404, "not found\n");
   send_file(std::move(*file), request, response);
 }
-
-namespace fs = std::filesystem;
 
 constexpr std::string_view kPrefix = "/packages/";
 constexpr std::string_view kEnding = ".texmesh";
@@ -224,56 +181,46 @@ std::string etag_of(const struct stat& st) {
 /// The parts of a relative path; nothing where one of them is empty, hidden or leads upwards.
 std::optional<std::vector<std::string>> parts_of(const std::string& path) {
   std::vector<std::string> parts;
-  for (std::size_t begin = 0; begin <= path.size();) {
-    const std::size_t end = std::min(path.find('/', begin), path.size());
-    std::string part = path.substr(begin, end - begin);
-    if (part.empty() || part[0] == '.' || part.find('\0') != std::string::npos) return std::nullopt;
-    parts.push_back(std::move(part));
-    begin = end + 1;
+  for (const std::string_view part : pieces_of(path, '/')) {
+    if (part.empty() || part[0] == '.' || part.find('\0') != part.npos) return std::nullopt;
+    parts.emplace_back(part);
   }
   return parts;
 }
 
-int open_part(int folder, const std::string& part, int flags) {
-  return ::openat(folder, part.c_str(), O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC | flags);
+Descriptor open_part(const Descriptor& folder, const std::string& part, int flags) {
+  return Descriptor(
+      ::openat(folder.get(), part.c_str(), O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC | flags));
 }
 
-bool has_manifest(int folder) {
+bool has_manifest(const Descriptor& folder) {
   struct stat st {};
-  return ::fstatat(folder, kManifestPath, &st, AT_SYMLINK_NOFOLLOW) == 0 && S_ISREG(st.st_mode);
+  return ::fstatat(folder.get(), kManifestPath, &st, AT_SYMLINK_NOFOLLOW) == 0 && S_ISREG(st.st_mode);
 }
 
-std::optional<ServedFile> regular_file(int fd, const std::string& path) {
-  if (fd < 0) return std::nullopt;
+std::optional<ServedFile> regular_file(Descriptor fd, const std::string& path) {
   struct stat st {};
-  if (::fstat(fd, &st) != 0 || !S_ISREG(st.st_mode)) {
-    ::close(fd);
-    return std::nullopt;
-  }
-  return ServedFile(fd, static_cast<std::uint64_t>(st.st_size), media_type(path), etag_of(st));
+  if (fd.get() < 0 || ::fstat(fd.get(), &st) != 0 || !S_ISREG(st.st_mode)) return std::nullopt;
+  return ServedFile{std::move(fd), static_cast<std::uint64_t>(st.st_size), media_type(path), etag_of(st)};
 }
 
 /// The file at the end of `parts`. With `packages_only`, one named .texmesh or beneath a folder
 /// with a manifest.
-std::optional<ServedFile> open_beneath(int root, const std::vector<std::string>& parts, bool packages_only) {
+std::optional<ServedFile> open_beneath(const Descriptor& root, const std::vector<std::string>& parts,
+                                       bool packages_only) {
   bool in_package = !packages_only;
-  int folder = ::dup(root);
-  for (std::size_t i = 0; folder >= 0 && i + 1 < parts.size(); ++i) {
-    const int next = open_part(folder, parts[i], O_DIRECTORY);
-    ::close(folder);
-    folder = next;
-    if (folder >= 0 && !in_package) in_package = has_manifest(folder);
+  Descriptor folder(::dup(root.get()));
+  for (std::size_t i = 0; i + 1 < parts.size(); ++i) {
+    folder = open_part(folder, parts[i], O_DIRECTORY);
+    if (!in_package) in_package = has_manifest(folder);
   }
-  if (folder < 0) return std::nullopt;
-  const bool allowed = in_package || parts.back().ends_with(kEnding);
-  const int fd = allowed ? open_part(folder, parts.back(), 0) : -1;
-  ::close(folder);
-  return regular_file(fd, parts.back());
+  if (!in_package && !parts.back().ends_with(kEnding)) return std::nullopt;
+  return regular_file(open_part(folder, parts.back(), 0), parts.back());
 }
 
-int open_folder_or_throw(const std::string& path) {
-  const int fd = ::open(path.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-  if (fd < 0) throw InputError(path, "", "", std::string("cannot be read: ") + std::strerror(errno));
+Descriptor open_folder_or_throw(const std::string& path) {
+  Descriptor fd(::open(path.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
+  if (fd.get() < 0) throw InputError(path, "", "", std::string("cannot be read: ") + std::strerror(errno));
   return fd;
 }
 
@@ -326,17 +273,17 @@ RequestedRange requested_range(const std::string& header, std::uint64_t size) {
   const std::size_t dash = text.find('-');
   if (dash == std::string_view::npos) return {};
   const std::string_view from = text.substr(0, dash), to = text.substr(dash + 1);
-  std::uint64_t first = 0, last = 0;
+  const auto first = whole_number<std::uint64_t>(from), last = whole_number<std::uint64_t>(to);
   if (from.empty()) {
-    if (!parse_number(to, last)) return {};
-    if (last == 0 || size == 0) return {RequestedRange::kUnsatisfiable, 0, 0};
-    const std::uint64_t bytes = std::min(last, size);
+    if (!last) return {};
+    if (*last == 0 || size == 0) return {RequestedRange::kUnsatisfiable, 0, 0};
+    const std::uint64_t bytes = std::min(*last, size);
     return {RequestedRange::kPart, size - bytes, bytes};
   }
-  if (!parse_number(from, first) || (!to.empty() && (!parse_number(to, last) || last < first))) return {};
-  if (first >= size) return {RequestedRange::kUnsatisfiable, 0, 0};
-  const std::uint64_t end = to.empty() ? size : std::min(last, size - 1) + 1;
-  return {RequestedRange::kPart, first, end - first};
+  if (!first || (!to.empty() && (!last || *last < *first))) return {};
+  if (*first >= size) return {RequestedRange::kUnsatisfiable, 0, 0};
+  const std::uint64_t end = to.empty() ? size : std::min(*last, size - 1) + 1;
+  return {RequestedRange::kPart, *first, end - *first};
 }
 
 struct ViewServer::Impl {
@@ -380,23 +327,6 @@ int ViewServer::bind(const std::string& host, int port) {
 
 void ViewServer::serve() { impl_->server.listen_after_bind(); }
 
-ServedFile::~ServedFile() {
-  if (fd_ >= 0) ::close(fd_);
-}
-ServedFile::ServedFile(ServedFile&& other) noexcept
-    : fd_(std::exchange(other.fd_, -1)),
-      bytes_(other.bytes_),
-      type_(std::move(other.type_)),
-      etag_(std::move(other.etag_)) {}
-
-std::size_t ServedFile::read(std::uint64_t offset, char* to, std::size_t size) const {
-  for (;;) {
-    const ssize_t n = ::pread(fd_, to, size, static_cast<off_t>(offset));
-    if (n < 0 && errno == EINTR) continue;
-    return n > 0 ? static_cast<std::size_t>(n) : 0;
-  }
-}
-
 PackageFolder find_packages(const std::string& package) {
   std::error_code error;
   const fs::path path = fs::canonical(package, error);
@@ -430,11 +360,6 @@ ServedFiles::ServedFiles(const std::string& package, const std::string& viewer) 
   if (found.alone) only_ = found.packages.front();
 }
 
-ServedFiles::~ServedFiles() {
-  if (viewer_ >= 0) ::close(viewer_);
-  if (root_ >= 0) ::close(root_);
-}
-
 std::optional<ServedFile> ServedFiles::open(const std::string& path) const {
   if (!path.starts_with("/")) return std::nullopt;
   if (path.starts_with(kPrefix)) {
@@ -447,11 +372,7 @@ std::optional<ServedFile> ServedFiles::open(const std::string& path) const {
     const auto parts = parts_of(tree ? rest.substr(only_.size()) : rest);
     if (!parts) return std::nullopt;
     if (!tree) return open_beneath(root_, *parts, true);
-    const int package = open_part(root_, only_.substr(0, only_.size() - 1), O_DIRECTORY);
-    if (package < 0) return std::nullopt;
-    auto file = open_beneath(package, *parts, false);
-    ::close(package);
-    return file;
+    return open_beneath(open_part(root_, only_.substr(0, only_.size() - 1), O_DIRECTORY), *parts, false);
   }
   const auto parts = parts_of(path == "/" ? "index.html" : path.substr(1));
   return parts ? open_beneath(viewer_, *parts, false) : std::nullopt;
@@ -462,7 +383,7 @@ std::vector<std::string> ServedFiles::packages() const {
   if (!only_.empty())
     found.packages.push_back(only_);
   else
-    list_packages("/proc/self/fd/" + std::to_string(root_), "", 0, found);
+    list_packages("/proc/self/fd/" + std::to_string(root_.get()), "", 0, found);
   for (std::string& p : found.packages) p = std::string(kPrefix.substr(1)) + percent_encoded(p);
   return found.packages;
 }

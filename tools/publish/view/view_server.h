@@ -2,6 +2,7 @@
 
 #include <memory>
 
+#include "format/base/descriptor.h"
 #include "pipeline/io/record.h"
 
 namespace texmesh {
@@ -35,26 +36,12 @@ class ViewServer {
   std::unique_ptr<Impl> impl_;
 };
 
-/// An open regular file; closed with the object.
-class ServedFile {
- public:
-  ServedFile(int fd, std::uint64_t bytes, std::string type, std::string etag)
-      : fd_(fd), bytes_(bytes), type_(std::move(type)), etag_(std::move(etag)) {}
-  ~ServedFile();
-  ServedFile(ServedFile&& other) noexcept;
-  ServedFile(const ServedFile&) = delete;
-  ServedFile& operator=(const ServedFile&) = delete;
-
-  std::uint64_t bytes() const { return bytes_; }
-  const std::string& type() const { return type_; }  // media type by the path's ending (SPEC.md, section 3)
-  const std::string& etag() const { return etag_; }  // strong: another file or another time is another tag
-  /// Up to `size` bytes from `offset`; 0 at the end of the file or where it cannot be read.
-  std::size_t read(std::uint64_t offset, char* to, std::size_t size) const;
-
- private:
-  int fd_;
-  std::uint64_t bytes_;
-  std::string type_, etag_;
+/// An open regular file.
+struct ServedFile {
+  Descriptor fd;
+  std::uint64_t bytes = 0;
+  std::string type;  // media type by the path's ending (SPEC.md, section 3)
+  std::string etag;  // strong: another file or another time is another tag
 };
 
 /// Packages on this machine.
@@ -79,9 +66,6 @@ class ServedFiles {
   /// `package` as of find_packages(); `viewer` a folder with index.html. InputError when one of them is not
   /// there or the folder holds no package.
   ServedFiles(const std::string& package, const std::string& viewer);
-  ~ServedFiles();
-  ServedFiles(const ServedFiles&) = delete;
-  ServedFiles& operator=(const ServedFiles&) = delete;
 
   /// The file of a decoded URL path ("/", "/assets/x.js", "/packages/bust.texmesh"); nothing where there
   /// is none. Thread-safe.
@@ -90,8 +74,8 @@ class ServedFiles {
   std::vector<std::string> packages() const;
 
  private:
-  int viewer_ = -1, root_ = -1;  // folders
-  std::string only_;             // the one entry of root_ that is served, "" = every package beneath
+  Descriptor viewer_, root_;  // folders
+  std::string only_;          // the one entry of root_ that is served, "" = every package beneath
 };
 
 /// What the viewer offers to choose from, packages.json: texts are left out where there are none.

@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include "format/container/container.h"
+#include "tests/support/check_crc.h"
 #include "tests/support/gltf_builder.h"
 #include "tests/support/images.h"
 
