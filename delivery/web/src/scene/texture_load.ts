@@ -2,6 +2,7 @@ import { type FragmentList, type ListOptions, lossesOf } from '../decide/fragmen
 import { scaleWithin } from '../decide/gpu_memory';
 import { proxyBytes } from '../decide/gpu_size';
 import { clamp } from '../decide/numbers';
+import { geometryFlip } from '../decide/prediction';
 import { proxyBytesBeyondStart, proxyLoss } from '../decide/proxy_choice';
 import { proxyStep } from '../decide/proxy_steps';
 import { throughputOf } from '../decide/request_groups';
@@ -72,6 +73,8 @@ const unseen = 1e-3;
 const showShare = 0.6;
 /** 1 - SSIM at which refining ends by default. */
 const defaultRefineTo = 0.003;
+/** FLIP of a scale beside S_0 at which refining takes no finer one. */
+const refinedFlip = 0.01;
 /** Refining ends where so many rounds have brought nothing. */
 const mostFruitlessRounds = 3;
 
@@ -223,8 +226,9 @@ export class TextureLoad {
   /** The scale that is enough at a displayed height, or the finest that its pictures may ask for. */
   private scaleFor_(heightPx: number, part: VisiblePart | undefined, finest = false): number {
     const { options: { rule = 'flip' }, memoryBytes, reader: { manifest } } = this.load_;
-    const scale = finest && rule === 'flip' && !this.alike_ ? finestShown(manifest.scales, heightPx)
-      : selectScale(manifest, heightPx, part, rule);
+    const isSeen = !part?.clipped || part.widthPx * part.heightPx > 0;
+    const scale = finest && isSeen && rule === 'flip' && !this.alike_
+      ? finestShown(manifest.scales, heightPx) : selectScale(manifest, heightPx, part, rule);
     return scaleWithin(manifest.scales, this.alike_?.(scale) ?? scale, memoryBytes);
   }
   /** Scale and planes for the display, or those that look best in the time. */
@@ -271,7 +275,18 @@ export class TextureLoad {
     await this.showFinerPlanes_();
     while (!again() && (await this.refineSome_()));
     if (!again()) await this.fetching_.composed();
+    if (!again()) await this.scale_.follow(this.refinedScale_());
     this.releaseIfBetter_();
+  }
+  /** What passes for S_0 still differs from it: the coarsest scale that hardly does, or the finest that shows. */
+  private refinedScale_(): number {
+    const { scale_: { wanted }, planes_: { data: { quality } },
+      load_: { override, view: { display: { heightPx, part } }, reader: { manifest: { scales } } } } = this;
+    const finest = this.scaleFor_(heightPx, part, true);
+    if (override.scale !== undefined || finest === this.scaleFor_(heightPx, part)) return wanted;
+    const alike = scales.filter(
+      ({ scale }) => scale >= finest && geometryFlip(quality, heightPx, scale) <= refinedFlip);
+    return Math.min(wanted, alike.at(-1)?.scale ?? finest);
   }
   /**
    * After the GPU has lost everything, or has refused something: shows previews within the memory that there

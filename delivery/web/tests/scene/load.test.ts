@@ -117,6 +117,17 @@ describe('a load', () => {
     }
     l.dispose();
   });
+  it('refines the mesh, too', async () => {
+    const { scales, steps: [{ upToPx }] } = reader.manifest;
+    const l = await loading(url, fakeServer(files), { time: Infinity, autoRefine: false, display: () => upToPx });
+    await l.model.done;
+    expect(l.model.state.wantedScale).toBeGreaterThan(0);
+    await l.model.refine();
+    const finest = scales.find((s) => s.triangles <= upToPx * upToPx)!.scale;
+    expect(l.model.state.wantedScale).toBeLessThan(reader.manifest.steps[0].scale);
+    expect(l.model.state.wantedScale).toBeGreaterThanOrEqual(finest);
+    l.dispose();
+  });
   it('does not ask again and again for what cannot be had', async () => {
     const server =
       fakeServer(files, { fault: ({ range }) => packs.some((p) => within(range, p)) && 'status-404' });
