@@ -1,6 +1,7 @@
 #include "format/split/split_reader.h"
 
 #include "format/base/bytes.h"
+#include "format/base/numbering.h"
 #include "format/base/sha256.h"
 #include "format/split/split_codec.h"
 #include "format/split/split_head.h"
@@ -94,13 +95,7 @@ void fill_lost_point(const SplitStreamHead& head, SplitMesh& mesh, std::uint32_t
 class Numbering {
  public:
   explicit Numbering(std::size_t count) : number_(count, kNoIndex) {}
-  std::uint32_t of(std::uint32_t old) {
-    if (number_[old] == kNoIndex) {
-      number_[old] = static_cast<std::uint32_t>(used_.size());
-      used_.push_back(old);
-    }
-    return number_[old];
-  }
+  std::uint32_t of(std::uint32_t old) { return numbered(number_[old], used_, old); }
   const std::vector<std::uint32_t>& used() const { return used_; }
 
  private:

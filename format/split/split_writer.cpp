@@ -2,6 +2,7 @@
 
 #include <compare>
 
+#include "format/base/buckets.h"
 #include "format/base/sha256.h"
 #include "format/split/split_codec.h"
 #include "format/split/split_head.h"
@@ -155,7 +156,8 @@ class SplitTruth {
   /// Per point of the stream: the split it is parent of that may come now. `early_`: per source point that
   /// the stream does not have yet.
   std::vector<std::uint32_t> ready_, early_;
-  std::vector<std::uint32_t> waiting_, first_, after_;
+  std::vector<std::uint32_t> waiting_;
+  Buckets<std::uint32_t> after_;
   std::vector<std::uint32_t> move_;  // per face of the stream: its wedge at the child of the split under way
   struct Born {
     std::uint32_t number, third;  // in Chapter::born; the source's point beside parent and child
@@ -172,17 +174,14 @@ class SplitTruth {
 void SplitTruth::begin_chapter(const SplitSource::Chapter& chapter) {
   chapter_ = &chapter;
   waiting_.assign(chapter.splits.size(), 0);
-  first_.assign(chapter.splits.size() + 1, 0);
   for (const auto& [a, b] : chapter.before) {
     if (a >= chapter.splits.size() || b >= chapter.splits.size())
       fail_split_source("order of splits", "splits of the chapter", std::to_string(std::max(a, b)));
-    ++first_[a + 1];
     ++waiting_[b];
   }
-  for (std::size_t i = 1; i < first_.size(); ++i) first_[i] += first_[i - 1];
-  after_.resize(chapter.before.size());
-  std::vector<std::uint32_t> at(first_.begin(), first_.end() - 1);
-  for (const auto& [a, b] : chapter.before) after_[at[a]++] = b;
+  after_ = in_buckets(chapter.splits.size(), [&](auto&& put) {
+    for (const auto& [a, b] : chapter.before) put(a, b);
+  });
   for (std::uint32_t s = 0; s < chapter.splits.size(); ++s)
     if (waiting_[s] == 0) make_ready(s);
   sort_patch();
@@ -212,13 +211,13 @@ void SplitTruth::look_at_split(std::uint32_t number, SplitStep step) const {
   const SplitSource::Split& split = chapter_->splits[number];
   if (step == SplitStep::kSplit) {
     ask_memory(&split);
-    ask_memory(&first_[number]);
+    ask_memory(&after_.first[number]);
     return;
   }
   if (step > SplitStep::kFollowing) return;
   const std::span moves(chapter_->moves.data() + split.move_begin, split.move_end - split.move_begin);
   const std::span born(chapter_->born.data() + split.born_begin, split.born_end - split.born_begin);
-  const std::span after(after_.data() + first_[number], first_[number + 1] - first_[number]);
+  const std::span<const std::uint32_t> after = after_[number];
   if (step == SplitStep::kLists) {
     for (const std::uint32_t p : {split.child, split.parent}) {
       ask_memory(&source_.points[p]);
@@ -252,8 +251,8 @@ void SplitTruth::check_moves(std::size_t found) const {
 void SplitTruth::end_split() {
   const SplitSource::Split& split = chapter_->splits[number_];
   for (std::uint32_t i = split.move_begin; i < split.move_end; ++i) move_[moved_face(i)] = kNoIndex;
-  for (std::uint32_t i = first_[number_]; i < first_[number_ + 1]; ++i)
-    if (--waiting_[after_[i]] == 0) make_ready(after_[i]);
+  for (const std::uint32_t s : after_[number_])
+    if (--waiting_[s] == 0) make_ready(s);
 }
 
 bool SplitTruth::is_any_target(std::uint32_t face, const std::vector<std::uint32_t>& wedges) const {

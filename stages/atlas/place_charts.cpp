@@ -3,6 +3,7 @@
 #include <numeric>
 #include <unordered_map>
 
+#include "format/base/numbering.h"
 #include "stages/atlas/atlas_parts.h"
 #include "stages/geometry/mesh_topology.h"
 
@@ -35,11 +36,8 @@ TexturedSurface textured_surface(const ConditionedMesh& from, const MaterialClas
     Triangle corners;
     for (int k = 0; k < 3; ++k) {
       const std::uint32_t position = from.twin[mesh.position_of(t, k)];
-      if (number[position] == kNoIndex) {
-        number[position] = static_cast<std::uint32_t>(out.surface.positions.size());
-        out.surface.positions.push_back(mesh.positions[position]);
-      }
-      corners[static_cast<std::size_t>(k)] = number[position];
+      corners[static_cast<std::size_t>(k)] =
+          numbered(number[position], out.surface.positions, mesh.positions[position]);
     }
     if (corners[0] == corners[1] || corners[1] == corners[2] || corners[2] == corners[0]) continue;
     out.triangles.push_back(t);

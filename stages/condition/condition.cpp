@@ -1,9 +1,9 @@
 #include "stages/condition/condition.h"
 
 #include <cassert>
-#include <numeric>
 #include <tuple>
 
+#include "format/base/buckets.h"
 #include "format/base/text_bytes.h"
 #include "format/model/add_wedge.h"
 #include "stages/base/run_context.h"
@@ -315,28 +315,24 @@ Kept drop_duplicates(const Mesh& in, const Kept& kept, ConditionReport& report) 
     auto tie() const { return std::tie(wedges, material_part); }
   };
   // Buckets by the lowest wedge keep the sorts short.
-  std::vector<std::uint32_t> start(in.wedge_count() + 1, 0);
-  const auto lowest = [](const Triangle& w) { return std::min({w[0], w[1], w[2]}); };
-  for (const Triangle& w : kept.wedges) ++start[lowest(w) + 1];
-  std::partial_sum(start.begin(), start.end(), start.begin());
-  std::vector<Key> keys(kept.wedges.size());
-  std::vector<std::uint32_t> at(start.begin(), start.end() - 1);
-  for (std::uint32_t i = 0; i < kept.wedges.size(); ++i) {
-    Triangle w = kept.wedges[i];
-    std::rotate(w.begin(), std::min_element(w.begin(), w.end()), w.end());
-    const std::uint32_t t = kept.source[i];
-    keys[at[w[0]]++] = {w, std::uint32_t{in.triangle_material[t]} << 16 | in.triangle_part[t], i};
-  }
+  Buckets<Key> keys = in_buckets<Key>(in.wedge_count(), [&](auto&& put) {
+    for (std::uint32_t i = 0; i < kept.wedges.size(); ++i) {
+      Triangle w = kept.wedges[i];
+      std::rotate(w.begin(), std::min_element(w.begin(), w.end()), w.end());
+      const std::uint32_t t = kept.source[i];
+      put(w[0], {w, std::uint32_t{in.triangle_material[t]} << 16 | in.triangle_part[t], i});
+    }
+  });
   std::vector<bool> drop(kept.source.size(), false);
   std::uint64_t dropped = 0;
-  for (std::size_t w = 0; w + 1 < start.size(); ++w) {
-    const auto begin = keys.begin() + start[w], end = keys.begin() + start[w + 1];
-    std::sort(begin, end, [](const Key& a, const Key& b) {
+  for (std::size_t w = 0; w < in.wedge_count(); ++w) {
+    const std::span<Key> bucket = keys[w];
+    std::ranges::sort(bucket, [](const Key& a, const Key& b) {
       return a.tie() != b.tie() ? a.tie() < b.tie() : a.index < b.index;
     });
-    for (auto i = begin; i != end; ++i)
-      if (i != begin && i->tie() == (i - 1)->tie()) {
-        drop[i->index] = true;
+    for (std::size_t i = 1; i < bucket.size(); ++i)
+      if (bucket[i].tie() == bucket[i - 1].tie()) {
+        drop[bucket[i].index] = true;
         ++dropped;
       }
   }

@@ -5,6 +5,8 @@
 #include <numeric>
 #include <utility>
 
+#include "format/base/buckets.h"
+
 namespace texmesh {
 namespace {
 
@@ -117,27 +119,23 @@ EdgeTable group_edges(std::span<const std::uint32_t> corner_position, std::size_
   // One bucket per lower end, then a sort within the bucket: several times faster than one sort over all
   // edges.
   const auto count = static_cast<std::uint32_t>(corner_position.size());
-  const auto ends = [&](std::uint32_t h) {
-    return std::minmax(corner_position[h], corner_position[next_corner(h)]);
-  };
-  std::vector<std::uint32_t> start(position_count + 1, 0);
-  for (std::uint32_t h = 0; h < count; ++h) ++start[ends(h).first + 1];
-  std::partial_sum(start.begin(), start.end(), start.begin());
-  std::vector<std::pair<std::uint32_t, std::uint32_t>> entries(count);  // higher end, half-edge
-  std::vector<std::uint32_t> at(start.begin(), start.end() - 1);
-  for (std::uint32_t h = 0; h < count; ++h) {
-    const auto [lo, hi] = ends(h);
-    entries[at[lo]++] = {hi, h};
-  }
+  using Entry = std::pair<std::uint32_t, std::uint32_t>;  // higher end, half-edge
+  Buckets<Entry> entries = in_buckets<Entry>(position_count, [&](auto&& put) {
+    for (std::uint32_t h = 0; h < count; ++h) {
+      const auto [lo, hi] = std::minmax(corner_position[h], corner_position[next_corner(h)]);
+      put(lo, {hi, h});
+    }
+  });
   EdgeTable table;
   table.half_edges.reserve(count);
   table.first.reserve(count / 2 + 2);
   for (std::size_t p = 0; p < position_count; ++p) {
-    std::sort(entries.begin() + start[p], entries.begin() + start[p + 1]);
-    for (std::uint32_t i = start[p]; i < start[p + 1]; ++i) {
-      if (i == start[p] || entries[i].first != entries[i - 1].first)
+    const std::span<Entry> bucket = entries[p];
+    std::ranges::sort(bucket);
+    for (std::size_t i = 0; i < bucket.size(); ++i) {
+      if (i == 0 || bucket[i].first != bucket[i - 1].first)
         table.first.push_back(static_cast<std::uint32_t>(table.half_edges.size()));
-      table.half_edges.push_back(entries[i].second);
+      table.half_edges.push_back(bucket[i].second);
     }
   }
   table.first.push_back(static_cast<std::uint32_t>(table.half_edges.size()));
@@ -257,18 +255,13 @@ std::uint64_t weld_rounded(const std::vector<Vec3f>& positions,
 
 std::vector<std::uint32_t> weld_wedges(const Mesh& mesh, const std::vector<std::uint32_t>& position_weld) {
   const std::size_t count = mesh.wedge_count();
-  const auto position = [&](std::size_t w) { return position_weld[mesh.wedge_position[w]]; };
-  std::vector<std::uint32_t> start(mesh.positions.size() + 1, 0);
-  for (std::size_t w = 0; w < count; ++w)
-    if (position(w) != kNoIndex) ++start[position(w) + 1];
-  std::partial_sum(start.begin(), start.end(), start.begin());
-  std::vector<std::uint32_t> order(start.back()), at(start.begin(), start.end() - 1);
-  for (std::size_t w = 0; w < count; ++w)
-    if (position(w) != kNoIndex) order[at[position(w)]++] = static_cast<std::uint32_t>(w);
-
+  Buckets<std::uint32_t> wedges = in_buckets(mesh.positions.size(), [&](auto&& put) {
+    for (std::uint32_t w = 0; w < count; ++w)
+      if (const std::uint32_t p = position_weld[mesh.wedge_position[w]]; p != kNoIndex) put(p, w);
+  });
   std::vector<std::uint32_t> weld(count, kNoIndex);
   for (std::size_t p = 0; p < mesh.positions.size(); ++p) {
-    const auto begin = order.begin() + start[p], end = order.begin() + start[p + 1];
+    const auto begin = wedges[p].begin(), end = wedges[p].end();
     if (end - begin > 1)
       std::sort(begin, end, [&](std::uint32_t a, std::uint32_t b) {
         const int c = Attributes(mesh, a).compare(Attributes(mesh, b));

@@ -1,5 +1,6 @@
 #include "stages/geometry/scale_frames.h"
 
+#include "format/base/numbering.h"
 #include "stages/base/parallel.h"
 #include "stages/geometry/distance.h"
 #include "stages/geometry/triangle_tree.h"
@@ -127,11 +128,7 @@ void Fit::add_faces(const NestedScale& scale) {
     Face face;
     for (std::size_t k = 0; k < 3; ++k) {
       const std::uint32_t w = t[k];
-      if (normal_of_[w] == kNoIndex) {
-        normal_of_[w] = static_cast<std::uint32_t>(normals_.size());
-        normals_.push_back(to_double(mesh_.normals[w]));
-      }
-      face.normal[k] = normal_of_[w];
+      face.normal[k] = numbered(normal_of_[w], normals_, to_double(mesh_.normals[w]));
       face.place[k] = place(w);
       face.corners[k] = to_double(mesh_.positions[mesh_.wedge_position[w]]);
     }

@@ -4,6 +4,7 @@
 // smallest triangles are dropped, so that every count is reached.
 #include "stages/proxies/simplify_surface.h"
 
+#include "format/base/numbering.h"
 #include "stages/charts/chart_parts.h"
 #include "stages/geometry/mesh_topology.h"
 #include "stages/geometry/quadric.h"
@@ -90,13 +91,7 @@ ProxySurface clean_soup(std::span<const Vec3f> positions, std::span<const Triang
   std::vector<std::uint32_t> at(points.size(), kNoIndex);
   for (std::size_t t = 0; t < welded.size(); ++t) {
     if (dropped[t]) continue;
-    for (std::uint32_t& corner : welded[t]) {
-      if (at[corner] == kNoIndex) {
-        at[corner] = static_cast<std::uint32_t>(surface.positions.size());
-        surface.positions.push_back(points[corner]);
-      }
-      corner = at[corner];
-    }
+    for (std::uint32_t& corner : welded[t]) corner = numbered(at[corner], surface.positions, points[corner]);
     surface.triangles.push_back(welded[t]);
     surface.group.push_back(groups[t]);
   }

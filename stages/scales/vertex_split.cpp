@@ -4,7 +4,8 @@
 #include "stages/scales/vertex_split.h"
 
 #include <algorithm>
-#include <numeric>
+
+#include "format/base/buckets.h"
 
 namespace texmesh {
 namespace {
@@ -89,18 +90,6 @@ class RoundedMesh {
     }
   }
 
-  /// The wedges of each point together, rising. `end`: per point, where its wedges end.
-  std::vector<std::uint32_t> by_points(std::vector<std::uint32_t>& end) const {
-    end.assign(places_.size() + 1, 0);
-    const auto point_of = [&](std::uint32_t w) { return point_[mesh_.wedge_position[w]]; };
-    const auto n = static_cast<std::uint32_t>(mesh_.wedge_count());
-    for (std::uint32_t w = 0; w < n; ++w) ++end[point_of(w) + 1];
-    std::partial_sum(end.begin(), end.end(), end.begin());
-    std::vector<std::uint32_t> order(n);
-    for (std::uint32_t w = 0; w < n; ++w) order[end[point_of(w)]++] = w;
-    return order;
-  }
-
   void merge_wedges(const std::vector<std::vector<std::int32_t>>& all) {
     const std::size_t n = mesh_.wedge_count();
     const auto compare = [&](std::uint32_t a, std::uint32_t b) {
@@ -111,17 +100,18 @@ class RoundedMesh {
       }
       return 0;
     };
-    std::vector<std::uint32_t> end;  // by point
-    std::vector<std::uint32_t> order = by_points(end);
+    Buckets<std::uint32_t> of_points = in_buckets(places_.size(), [&](auto&& put) {
+      for (std::uint32_t w = 0; w < n; ++w) put(point_[mesh_.wedge_position[w]], w);
+    });
     std::vector<std::uint32_t> same(n);  // the lowest equal wedge
-    for (std::size_t p = 0, i = 0; p < places_.size(); ++p) {
-      const auto at = [&](std::size_t k) { return order.begin() + static_cast<std::ptrdiff_t>(k); };
-      std::sort(at(i), at(end[p]), [&](std::uint32_t a, std::uint32_t b) {
+    for (std::size_t p = 0; p < places_.size(); ++p) {
+      const std::span<std::uint32_t> wedges = of_points[p];
+      std::ranges::sort(wedges, [&](std::uint32_t a, std::uint32_t b) {
         const int c = compare(a, b);
         return c < 0 || (c == 0 && a < b);
       });
-      for (const std::size_t begin = i; i < end[p]; ++i)
-        same[order[i]] = i > begin && compare(order[i - 1], order[i]) == 0 ? same[order[i - 1]] : order[i];
+      for (std::size_t i = 0; i < wedges.size(); ++i)
+        same[wedges[i]] = i > 0 && compare(wedges[i - 1], wedges[i]) == 0 ? same[wedges[i - 1]] : wedges[i];
     }
     wedge_.resize(n);
     values_.resize(attributes_.size());

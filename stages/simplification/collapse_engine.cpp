@@ -1,7 +1,5 @@
 #include "stages/simplification/collapse_engine.h"
 
-#include <numeric>
-
 #include "stages/base/parallel.h"
 
 namespace texmesh {
@@ -592,20 +590,13 @@ void CollapseCost::merge(const CollapseRing& ring, const CollapseRing::WedgeMap&
 }
 
 CollapseComponents::CollapseComponents(const CollapseMesh& mesh, const ConditionedMesh& input)
-    : begin(input.component_count + 1, 0),
-      points(mesh.point_count()),
-      size(input.component_count, 0),
-      cost(input.component_count, 0) {
+    : size(input.component_count, 0), cost(input.component_count, 0) {
   auto component = [&](std::uint32_t p) { return input.component[mesh.members(p)[0]]; };
+  points = in_buckets(count(), [&](auto&& put) {
+    for (std::uint32_t p = 0; p < mesh.point_count(); ++p) put(component(p), p);
+  });
   std::vector<Box3d> box(count());
-  for (std::uint32_t p = 0; p < mesh.point_count(); ++p) {
-    const std::uint32_t c = component(p);
-    ++begin[c + 1];
-    box[c].extend(mesh.point(p));
-  }
-  std::partial_sum(begin.begin(), begin.end(), begin.begin());
-  std::vector<std::uint32_t> at(begin.begin(), begin.end() - 1);
-  for (std::uint32_t p = 0; p < mesh.point_count(); ++p) points[at[component(p)]++] = p;
+  for (std::uint32_t p = 0; p < mesh.point_count(); ++p) box[component(p)].extend(mesh.point(p));
 
   std::vector<double> area(count(), 0);
   for (const CollapseMesh::Face& face : mesh.faces()) {

@@ -53,34 +53,24 @@ void CollapseMesh::number_points(const ConditionedMesh& input,
     points_[i] = local(order[i].second);
     point_of_position[order[i].second] = static_cast<std::uint32_t>(i);
   }
-  member_begin_.assign(order.size() + 1, 0);
-  for (std::size_t p = 0; p < n; ++p) {
-    point_of_position[p] = point_of_position[input.twin[p]];
-    ++member_begin_[point_of_position[p] + 1];
-  }
-  std::partial_sum(member_begin_.begin(), member_begin_.end(), member_begin_.begin());
-  members_.resize(n);
-  std::vector<std::uint32_t> at(member_begin_.begin(), member_begin_.end() - 1);
-  for (std::size_t p = 0; p < n; ++p) members_[at[point_of_position[p]]++] = static_cast<std::uint32_t>(p);
+  for (std::size_t p = 0; p < n; ++p) point_of_position[p] = point_of_position[input.twin[p]];
+  members_ = in_buckets(order.size(), [&](auto&& put) {
+    for (std::uint32_t p = 0; p < n; ++p) put(point_of_position[p], p);
+  });
   alive_positions_ = static_cast<std::uint32_t>(n);
 }
 
 void CollapseMesh::add_faces(const Mesh& mesh, const std::vector<std::uint32_t>& point_of_position) {
   const std::size_t n = mesh.triangles.size();
-  std::vector<std::uint32_t> first(points_.size() + 1, 0), key(n);
-  for (std::size_t t = 0; t < n; ++t) {
-    const auto i = static_cast<std::uint32_t>(t);
-    key[t] = std::min({point_of_position[mesh.position_of(i, 0)], point_of_position[mesh.position_of(i, 1)],
-                       point_of_position[mesh.position_of(i, 2)]});
-    ++first[key[t] + 1];
-  }
-  std::partial_sum(first.begin(), first.end(), first.begin());
+  const auto point = [&](std::uint32_t t, int k) { return point_of_position[mesh.position_of(t, k)]; };
+  face_source_ = in_buckets(points_.size(), [&](auto&& put) {
+                   for (std::uint32_t t = 0; t < n; ++t)
+                     put(std::min({point(t, 0), point(t, 1), point(t, 2)}), t);
+                 }).items;
   faces_.resize(n);
-  face_source_.resize(n);
   face_of_source_.resize(n);
-  for (std::size_t t = 0; t < n; ++t) {
-    const std::uint32_t f = first[key[t]]++;
-    face_source_[f] = static_cast<std::uint32_t>(t);
+  for (std::uint32_t f = 0; f < n; ++f) {
+    const std::uint32_t t = face_source_[f];
     face_of_source_[t] = f;
     for (std::size_t k = 0; k < 3; ++k) {
       faces_[f].wedge[k] = mesh.triangles[t][k];

@@ -1,6 +1,7 @@
 #pragma once
 #include <span>
 
+#include "format/base/buckets.h"
 #include "stages/data/conditioned_mesh.h"
 
 namespace texmesh {
@@ -36,9 +37,9 @@ class CollapseMesh {
     return {pool_.data() + lists_[p].begin, lists_[p].count};
   }
   std::span<const std::uint32_t> members(std::uint32_t p) const {  // positions of the input
-    return {members_.data() + member_begin_[p], member_begin_[p + 1] - member_begin_[p]};
+    return members_[p];
   }
-  bool is_multiple(std::uint32_t p) const { return member_begin_[p + 1] - member_begin_[p] > 1; }
+  bool is_multiple(std::uint32_t p) const { return members_[p].size() > 1; }
   std::uint32_t wedge_position(std::uint32_t w) const { return wedge_position_[w]; }  // position of the input
   std::uint32_t wedge_source(std::uint32_t w) const { return wedge_source_[w]; }  // wedge with the attributes
   /// Texture coordinates that guide collapses: of the set that the wedge's material uses for its colours;
@@ -116,7 +117,7 @@ class CollapseMesh {
   std::uint32_t input_wedges_ = 0, alive_faces_ = 0, alive_positions_ = 0;
   double diagonal_ = 1;
   std::vector<Vec3d> points_;
-  std::vector<std::uint32_t> members_, member_begin_;
+  Buckets<std::uint32_t> members_;
   std::vector<Face> faces_;
   std::vector<std::uint32_t> face_source_, face_of_source_;
   std::vector<std::uint32_t> left_;  // triangles of the input that were left at the last snapshot

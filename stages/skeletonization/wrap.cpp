@@ -4,6 +4,7 @@
 
 #include <meshoptimizer.h>
 
+#include "format/base/numbering.h"
 #include "stages/geometry/mesh_topology.h"
 
 namespace texmesh {
@@ -94,14 +95,8 @@ TriangleSoup used_part(const Gathered& g) {
   for (std::size_t i = 0; i + 2 < g.indices.size(); i += 3) {
     if (!(twice_area(g, i) > 0)) continue;
     Triangle t{};
-    for (std::size_t k = 0; k < 3; ++k) {
-      std::uint32_t& n = number[g.indices[i + k]];
-      if (n == kNoIndex) {
-        n = static_cast<std::uint32_t>(soup.points.size());
-        soup.points.push_back(g.points[g.indices[i + k]]);
-      }
-      t[k] = n;
-    }
+    for (std::size_t k = 0; k < 3; ++k)
+      t[k] = numbered(number[g.indices[i + k]], soup.points, g.points[g.indices[i + k]]);
     soup.triangles.push_back(t);
   }
   return soup;
@@ -114,20 +109,9 @@ std::vector<TriangleSoup> split_parts(const TriangleSoup& wrap) {
   std::vector<TriangleSoup> parts;
   std::vector<std::uint32_t> part(wrap.points.size(), kNoIndex), number(wrap.points.size(), kNoIndex);
   for (const Triangle& t : wrap.triangles) {
-    std::uint32_t& n = part[sets.find(t[0])];
-    if (n == kNoIndex) {
-      n = static_cast<std::uint32_t>(parts.size());
-      parts.emplace_back();
-    }
-    TriangleSoup& to = parts[n];
+    TriangleSoup& to = parts[numbered(part[sets.find(t[0])], parts, {})];
     Triangle& triangle = to.triangles.emplace_back();
-    for (std::size_t k = 0; k < 3; ++k) {
-      if (number[t[k]] == kNoIndex) {
-        number[t[k]] = static_cast<std::uint32_t>(to.points.size());
-        to.points.push_back(wrap.points[t[k]]);
-      }
-      triangle[k] = number[t[k]];
-    }
+    for (std::size_t k = 0; k < 3; ++k) triangle[k] = numbered(number[t[k]], to.points, wrap.points[t[k]]);
   }
   return parts;
 }

@@ -1,3 +1,4 @@
+#include "format/base/buckets.h"
 #include "stages/base/parallel.h"
 #include "stages/geometry/morton.h"
 #include "stages/ssf/heat_kernel.h"
@@ -44,36 +45,30 @@ class MortonCode {
 void group_positions(const ConditionedMesh& mesh, Layout& layout) {
   const auto& positions = mesh.mesh.positions;
   const MortonCode code(positions);
-  auto& first = layout.first_position;
-  first.assign(mesh.component_count + 1, 0);
-  for (std::uint32_t p = 0; p < positions.size(); ++p)
-    if (mesh.twin[p] == p) ++first[mesh.component[p] + 1];
-  for (std::size_t c = 0; c < mesh.component_count; ++c) first[c + 1] += first[c];
-  std::vector<std::pair<std::uint64_t, std::uint32_t>> keyed(first.back());
-  std::vector<std::uint32_t> at(first.begin(), first.end() - 1);
-  for (std::uint32_t p = 0; p < positions.size(); ++p)
-    if (mesh.twin[p] == p) keyed[at[mesh.component[p]]++] = {code(positions[p]), p};
-  for (std::size_t c = 0; c < mesh.component_count; ++c)
-    std::sort(keyed.begin() + first[c], keyed.begin() + first[c + 1]);
-  layout.position.resize(keyed.size());
+  using Coded = std::pair<std::uint64_t, std::uint32_t>;
+  Buckets<Coded> coded = in_buckets<Coded>(mesh.component_count, [&](auto&& put) {
+    for (std::uint32_t p = 0; p < positions.size(); ++p)
+      if (mesh.twin[p] == p) put(mesh.component[p], {code(positions[p]), p});
+  });
+  layout.first_position = coded.first;
+  layout.position.resize(coded.items.size());
   layout.vertex.assign(positions.size(), 0);
-  for (std::size_t c = 0; c < mesh.component_count; ++c)
-    for (std::uint32_t i = first[c]; i < first[c + 1]; ++i) {
-      layout.position[i] = keyed[i].second;
-      layout.vertex[keyed[i].second] = i - first[c];
+  for (std::size_t c = 0; c < mesh.component_count; ++c) {
+    std::ranges::sort(coded[c]);
+    for (std::uint32_t i = coded.first[c]; i < coded.first[c + 1]; ++i) {
+      layout.position[i] = coded.items[i].second;
+      layout.vertex[coded.items[i].second] = i - coded.first[c];
     }
+  }
 }
 
 void group_triangles(const ConditionedMesh& mesh, Layout& layout) {
   const Mesh& m = mesh.mesh;
-  auto& first = layout.first_triangle;
-  first.assign(mesh.component_count + 1, 0);
-  const auto component = [&](std::uint32_t t) { return mesh.component[m.position_of(t, 0)]; };
-  for (std::uint32_t t = 0; t < m.triangles.size(); ++t) ++first[component(t) + 1];
-  for (std::size_t c = 0; c < mesh.component_count; ++c) first[c + 1] += first[c];
-  layout.triangle.resize(m.triangles.size());
-  std::vector<std::uint32_t> at(first.begin(), first.end() - 1);
-  for (std::uint32_t t = 0; t < m.triangles.size(); ++t) layout.triangle[at[component(t)]++] = t;
+  Buckets<std::uint32_t> triangles = in_buckets(mesh.component_count, [&](auto&& put) {
+    for (std::uint32_t t = 0; t < m.triangles.size(); ++t) put(mesh.component[m.position_of(t, 0)], t);
+  });
+  layout.first_triangle = std::move(triangles.first);
+  layout.triangle = std::move(triangles.items);
 }
 
 void measure(const Mesh& m, Layout& layout) {

@@ -2,6 +2,7 @@
 
 #include <meshoptimizer.h>
 
+#include "format/base/numbering.h"
 #include "format/base/portable_math.h"
 #include "stages/gltf/glb_writer.h"
 #include "stages/image/resize.h"
@@ -285,13 +286,7 @@ GroupMesh group_mesh(const AtlasMesh& mesh, std::uint32_t group, const PositionG
     std::array<std::array<std::uint32_t, 3>, 3> at;
     for (std::size_t k = 0; k < 3; ++k) at[k] = grid.places(mesh.positions[corner[k]]);
     if (at[0] == at[1] || at[1] == at[2] || at[2] == at[0]) continue;
-    for (const std::uint32_t v : corner) {
-      if (index[v] == kNoIndex) {
-        index[v] = static_cast<std::uint32_t>(out.vertices.size());
-        out.vertices.push_back(v);
-      }
-      out.indices.push_back(index[v]);
-    }
+    for (const std::uint32_t v : corner) out.indices.push_back(numbered(index[v], out.vertices, v));
   }
   if (out.indices.empty()) return out;
   std::vector<std::uint32_t> ordered(out.indices.size()), remap(out.vertices.size());

@@ -161,6 +161,13 @@ TEST_F(CliView, ReachesPackagesOnlyAndReadsOnly) {
   EXPECT_EQ(list["packages"][0]["url"], "packages/a%20scan.texmesh");
   EXPECT_TRUE(list["packages"][0].contains("poster"));
   EXPECT_EQ(status("/posters/a%20scan.texmesh"), 200);
+  EXPECT_TRUE(list["packages"][2].contains("poster")) << list;
+  EXPECT_EQ(client().Get("/posters/tree/")->body, read_text(folder_ / "all/tree/poster.jpg"));
+  for (const char* none :
+       {"/posters/notes.txt", "/posters/link.texmesh", "/posters/up/all/tree/", "/posters/"})
+    EXPECT_EQ(status(none), 404) << none;
+  write_text(folder_ / "all/tree/poster.jpg", "another picture");
+  EXPECT_EQ(status("/posters/tree/"), 404);
   for (const char* there : {"/packages/a%20scan.texmesh", "/packages/more/b.texmesh",
                             "/packages/tree/manifest.json", "/packages/tree/mesh/s00.glb"})
     EXPECT_EQ(status(there), 200) << there;

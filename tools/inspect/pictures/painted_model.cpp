@@ -4,6 +4,7 @@
 
 #include <fmt/format.h>
 
+#include "format/base/buckets.h"
 #include "format/base/portable_math.h"
 #include "format/rules/allocation.h"
 #include "pipeline/compile/stage_table.h"
@@ -58,26 +59,20 @@ void add_stops(ColourLegend& legend) {
   throw StageError("painting", what, std::to_string(positions) + " positions", std::to_string(values));
 }
 
-/// Neighbours along the edges, [first[p], first[p + 1]) of `list`; with repetitions.
-struct Neighbours {
-  std::vector<std::uint32_t> first, list;
-  explicit Neighbours(const Mesh& m) : first(m.positions.size() + 1, 0), list(6 * m.triangles.size()) {
-    for (std::uint32_t t = 0; t < m.triangles.size(); ++t)
-      for (int k = 0; k < 3; ++k) first[m.position_of(t, k) + 1] += 2;
-    for (std::size_t p = 0; p < m.positions.size(); ++p) first[p + 1] += first[p];
-    std::vector<std::uint32_t> at(first.begin(), first.end() - 1);
+/// By position its neighbours along the edges; with repetitions.
+Buckets<std::uint32_t> neighbours_of(const Mesh& m) {
+  return in_buckets(m.positions.size(), [&](auto&& put) {
     for (std::uint32_t t = 0; t < m.triangles.size(); ++t)
       for (int k = 0; k < 3; ++k)
-        for (int other = 1; other < 3; ++other)
-          list[at[m.position_of(t, k)]++] = m.position_of(t, (k + other) % 3);
-  }
-};
+        for (int other = 1; other < 3; ++other) put(m.position_of(t, k), m.position_of(t, (k + other) % 3));
+  });
+}
 
 /// A feature of a large scale is one vertex for all that are nearer than the distance that features of that
 /// scale keep; on a dense mesh a line of them would be specks. Each is painted half as large: they touch.
 std::vector<double> spread_features(const ConditionedMesh& mesh, const ScaleMap& map) {
   const Mesh& m = mesh.mesh;
-  const Neighbours neighbours(m);
+  const Buckets<std::uint32_t> neighbours = neighbours_of(m);
   const std::vector<Box3f> boxes = component_boxes(mesh.component, m.positions);
   const SsfOptions usual;
   std::vector<double> value(map.persistence.begin(), map.persistence.end());
@@ -90,8 +85,7 @@ std::vector<double> spread_features(const ConditionedMesh& mesh, const ScaleMap&
     near.assign(1, feature);
     seen_from[feature] = feature;
     for (std::size_t i = 0; i < near.size(); ++i)
-      for (std::uint32_t k = neighbours.first[near[i]]; k < neighbours.first[near[i] + 1]; ++k) {
-        const std::uint32_t p = neighbours.list[k];
+      for (const std::uint32_t p : neighbours[near[i]]) {
         if (seen_from[p] == feature ||
             length(to_double(m.positions[p]) - to_double(m.positions[feature])) > reach)
           continue;
