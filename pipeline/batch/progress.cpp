@@ -202,7 +202,8 @@ void Progress::show(std::size_t, const CacheTold& e) {
 
 void Progress::show(std::size_t, const NoteTold& e) {
   const bool warns = e.note.severity == Severity::kWarning;
-  constexpr std::array<std::string_view, 3> kToldOnce{kTurnedNote, kChosenAtlasNote, kRebuiltAtlasNote};
+  constexpr std::array<std::string_view, 4> kToldOnce{kTurnedNote, kChosenAtlasNote, kRebuiltAtlasNote,
+                                                      kKeptAtlasNote};
   const bool tells = is_told_always(e.note) || std::ranges::count(kToldOnce, e.note.code) > 0;
   if (warns || verbose_ || (tells && mode_ != OutputMode::kQuiet))
     line(fmt::format("{}: {}: {}", e.model, warns ? "warning" : "note", note_sentence(e.note)));

@@ -158,11 +158,14 @@ class Finder {
   bool read_beside() {
     std::set<std::string> names;
     for (const auto* all : {&inside_, &beside_})
-      for (const std::string& name : *all) names.insert(std::string(kTexturesBeside).append(last_part(name)));
+      for (const std::string& name : *all) names.emplace(last_part(name));
     for (const std::string& name : names) {
-      const std::string looked_for = found_.looked_for;
-      if (read(name)) return warn_of_moved();
-      if (!found_.looked_for.ends_with(')')) found_.looked_for = looked_for;  // it was not refused
+      found_.name = std::string(kTexturesBeside) + name;
+      try {
+        if ((found_.bytes = resolver_.read_beside(name, max_bytes_))) return warn_of_moved();
+      } catch (const FileRefused& e) {
+        found_.looked_for += ", " + quote(found_.name) + " (" + e.found() + ")";
+      }
     }
     return false;
   }

@@ -184,7 +184,7 @@ bool FileResolver::is_in_source() {
 
 int FileResolver::open_beside(const std::string& uri) {
   namespace fs = std::filesystem;
-  if (!is_in_source()) return -1;
+  if (!is_in_source()) throw FileRefused(uri, "", kRegularFile, "a name that leaves the model's folder");
   const fs::path both = own_path_->parent_path();
   std::error_code ec;
   for (std::size_t i = 1; i < roots_.size(); ++i) {
@@ -226,7 +226,6 @@ int FileResolver::open_regular(const std::string& uri) {
 }
 
 std::optional<Bytes> FileResolver::read(const std::string& uri, std::uint64_t max_bytes) {
-  if (uri.starts_with(kTexturesBeside) && !is_in_source()) return std::nullopt;
   const std::size_t index = number_of(uri);
   try {
     const Descriptor fd(open_regular(uri));
@@ -239,6 +238,10 @@ std::optional<Bytes> FileResolver::read(const std::string& uri, std::uint64_t ma
     failed_for_resources_ = true;
     throw;
   }
+}
+
+std::optional<Bytes> FileResolver::read_beside(const std::string& name, std::uint64_t max_bytes) {
+  return is_in_source() ? read(std::string(kTexturesBeside) + name, max_bytes) : std::nullopt;
 }
 
 std::vector<std::string> FileResolver::similar(const std::string& uri) {

@@ -25,6 +25,7 @@ class FileResolver : public Resolver {
   FileResolver& operator=(const FileResolver&) = delete;
 
   std::optional<Bytes> read(const std::string& uri, std::uint64_t max_bytes) override;
+  std::optional<Bytes> read_beside(const std::string& name, std::uint64_t max_bytes) override;
   std::vector<std::string> similar(const std::string& uri) override;
 
   /// What was known of files before: a file that has exactly such a stamp is not read to learn its digest.

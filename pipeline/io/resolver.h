@@ -17,11 +17,16 @@ class Resolver {
   /// (absolute, drive letter, scheme, "..", a symbolic link that leads elsewhere, not a regular file), and
   /// InputError when the file exceeds max_bytes.
   virtual std::optional<Bytes> read(const std::string& uri, std::uint64_t max_bytes) = 0;
+  /// textures/NAME beside the model's folder, where that may be read (FileResolver says when); `name` has one
+  /// part. Nothing when there is none; throws as read().
+  virtual std::optional<Bytes> read_beside(const std::string& /*name*/, std::uint64_t /*max_bytes*/) {
+    return std::nullopt;
+  }
   /// Files of other names that may be meant by `uri` (similar_key()), sorted.
   virtual std::vector<std::string> similar(const std::string&) { return {}; }
 };
 
-/// The one folder beside the model's that a resolver may read, see FileResolver: "../textures/bust.png".
+/// How requests have what read_beside() was asked for: "../textures/bust.png".
 inline constexpr std::string_view kTexturesBeside = "../textures/";
 
 /// What lies under a name must not be read.

@@ -17,7 +17,7 @@ constexpr int kPngLevel = 1;                          // the files are read once
 ChartedModel kept(const ConditionedMesh& mesh, const std::vector<Material>& materials,
                   const std::vector<Image>& images, const std::string& reason) {
   ChartedModel out{mesh, materials, images, {}};
-  if (!reason.empty()) add_info(out.notes, "atlas-kept", "", "the source's atlas is kept: " + reason);
+  if (!reason.empty()) add_info(out.notes, kKeptAtlasNote, "", "the source's atlas is kept: " + reason);
   return out;
 }
 

@@ -13,8 +13,9 @@ struct EnumNames<AtlasMode> {
   static constexpr std::array<std::string_view, 3> names{"keep", "rebuild", "auto"};
 };
 
-/// The note of a new atlas, and what its files are not.
+/// The notes of a new atlas, and of one that was asked for and not made; and what a new one's files are not.
 inline constexpr const char* kRebuiltAtlasNote = "atlas-rebuilt";
+inline constexpr const char* kKeptAtlasNote = "atlas-kept";
 inline constexpr const char* kLostByRebuilding =
     "The source's own files of its textures are not in the package, and new texels differ a little from them";
 

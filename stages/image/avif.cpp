@@ -73,12 +73,14 @@ struct Decoder {
     if (!avif) throw InputError(name, "image header", "memory for an AVIF decoder", "none");
     avif->maxThreads = 1;
     avif->ignoreExif = avif->ignoreXMP = AVIF_TRUE;
+    check("image header", avifDecoderSetIOMemory(avif, bytes.data(), bytes.size()));
+    check("image header", avifDecoderParse(avif));
+    // libavif would call too large an image a file that cannot be parsed. No pixel has been decoded.
+    check_image_size(name, avif->image->width, avif->image->height, limits);
     avif->imageSizeLimit = static_cast<std::uint32_t>(
         std::clamp<std::uint64_t>(limits.max_pixels, 1, AVIF_DEFAULT_IMAGE_SIZE_LIMIT));
     avif->imageDimensionLimit =
         std::min<std::uint32_t>(limits.max_side_px, AVIF_DEFAULT_IMAGE_DIMENSION_LIMIT);
-    check("image header", avifDecoderSetIOMemory(avif, bytes.data(), bytes.size()));
-    check("image header", avifDecoderParse(avif));
   }
   void check(const char* place, avifResult result) const {
     if (result != AVIF_RESULT_OK) throw InputError(name, place, "a whole AVIF", avifResultToString(result));
@@ -122,7 +124,6 @@ bool is_avif(ByteSpan bytes) {
 AvifPicture decode_avif(const std::string& name, ByteSpan bytes, const ImageLimits& limits) {
   const Decoder decoder(name, bytes, limits);
   const avifImage& image = *decoder.avif->image;
-  check_image_size(name, image.width, image.height, limits);
   if (image.transformFlags & (AVIF_TRANSFORM_CLAP | AVIF_TRANSFORM_IROT | AVIF_TRANSFORM_IMIR))
     throw InputError(name, "image header", "a picture that is not to be cut, turned or mirrored",
                      "one that is");

@@ -91,7 +91,7 @@ test('hosts: a server that fails for a while is not stormed; the rest comes when
   const isPackage = (r) => r.path.endsWith('large.texmesh');
   server.setFault((r) => isPackage(r) && server.requests.filter(isPackage).length > 4 && {status: 503});
   const without = await becomes(page, (m) => m.phase === 'shown' && m.complete, 'without a server');
-  check(without.lacking && without.note === 'Some of it has not come yet.', JSON.stringify({...without, rungs: 0}));
+  check(without.lacking && without.note === 'Parts of it could not be loaded yet.', JSON.stringify({...without, rungs: 0}));
   const asked = server.requests.filter((r) => r.status === 503).length;
   check(asked > 4 && asked < 110, `${asked} requests of a server that fails`);
   server.setFault(() => undefined);
@@ -101,7 +101,7 @@ test('hosts: a server that fails for a while is not stormed; the rest comes when
 
 test('hosts: what failed without a network is tried again when there is one', () => onPage(one(), async (page, server) => {
   await becomes(page, failed, 'without a network');
-  check(/did not come/.test((await model(page)).error), (await model(page)).error);
+  check(/could not be loaded/.test((await model(page)).error), (await model(page)).error);
   server.setFault(() => undefined);
   await page.evaluate(() => window.dispatchEvent(new Event('online')));
   const {error} = await becomes(page, complete, 'with a network');

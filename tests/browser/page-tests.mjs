@@ -107,7 +107,7 @@ test('one package of twenty that cannot be had, an element of no height, one rem
     await page.waitForFunction(() => [...document.querySelectorAll('texmesh-viewer')].map((e) => e.model?.phase).join() === 'shown,failed,shown,waiting,failed', null, {timeout: 40000})
       .catch(async () => check(false, await page.evaluate(done)));
     const said = await page.evaluate(() => document.querySelectorAll('texmesh-viewer')[1].shadowRoot.querySelector('[part=error]').innerText);
-    check(/did not come/.test(said) && /Try again/.test(said) && !/503/.test(said), said);
+    check(/could not be loaded/.test(said) && /Try again/.test(said) && !/503/.test(said), said);
     page.said = page.said.filter((s) => !/503/.test(s)); // the browser's own line
   }, {fault: ({path: p}) => (/large/.test(p) ? {status: 503} : undefined)});
 }, {seconds: 90});

@@ -38,6 +38,9 @@ class ModelFiles : public Resolver {
     if (!package_) package_.emplace(folder_ / "..");
     return package_->read(uri.substr(std::string_view("../").size()), max_bytes);
   }
+  std::optional<Bytes> read_beside(const std::string& name, std::uint64_t max_bytes) override {
+    return files_.read_beside(name, max_bytes);
+  }
   std::vector<std::string> similar(const std::string& uri) override { return files_.similar(uri); }
   bool failed_for_resources() const {
     return files_.failed_for_resources() || (package_ && package_->failed_for_resources());

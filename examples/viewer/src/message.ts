@@ -34,7 +34,7 @@ function sentence(error: unknown, text: string): string {
   if (error instanceof FormatError) return 'This object cannot be shown.';
   if (/webgl/i.test(text)) return 'This browser cannot show objects in 3D.';
   if (isMissing(text)) return 'This object is not here any more.';
-  return 'The object did not come. Please check the connection.';
+  return 'The object could not be loaded. Please check the connection.';
 }
 
 function headline(error: unknown, text: string): string {

@@ -43,6 +43,9 @@ class FilesThere : public Resolver {
   std::optional<Bytes> read(const std::string& uri, std::uint64_t) override {
     return files_.is_there(uri) ? std::optional<Bytes>(Bytes{}) : std::nullopt;
   }
+  std::optional<Bytes> read_beside(const std::string& name, std::uint64_t max_bytes) override {
+    return read(std::string(kTexturesBeside) + name, max_bytes);
+  }
   std::vector<std::string> similar(const std::string& uri) override { return files_.similar(uri); }
 
  private:

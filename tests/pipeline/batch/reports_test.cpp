@@ -169,6 +169,21 @@ TEST(Progress, TheBarEndsWithoutATrace) {
   EXPECT_EQ(text.back(), '\n');
 }
 
+TEST(Progress, WhatBecameOfAnAtlasThatWasAskedForIsTold) {
+  for (const char* code : {"atlas-rebuilt", "atlas-kept", "atlas-chosen"}) {
+    std::ostringstream out;
+    Progress progress(out, OutputMode::kPlain, false, false);
+    progress.begin({{"a.obj", 1}});
+    progress.started(0, "a.texmesh");
+    progress.event(
+        0,
+        told_by_child(Json{
+            {"event", "note"}, {"severity", "info"}, {"code", code}, {"place", ""}, {"text", "this and that"}}
+                          .dump()));
+    EXPECT_NE(out.str().find("this and that"), std::string::npos) << code;
+  }
+}
+
 TEST(Progress, CancelledModelsAreNotDone) {
   std::ostringstream out;
   Progress progress(out, OutputMode::kTerminal, false, false);

@@ -80,6 +80,12 @@ TEST(Avif, LimitsCountBeforePixels) {
   const Bytes file = encode_avif(picture(96, 64, 3), {});
   EXPECT_THROW(decode_avif("x", file, {.max_side_px = 95}), InputError);
   EXPECT_THROW(decode_avif("x", file, {.max_pixels = 96 * 64 - 1}), InputError);
+  try {
+    decode_avif("x", file, {.max_side_px = 95});
+  } catch (const InputError& e) {
+    EXPECT_EQ(e.expected(), "sides up to 95 px");
+    EXPECT_EQ(e.found(), "96 x 64") << "not a file that cannot be parsed";
+  }
   EXPECT_EQ(decode_avif("x", file, {.max_side_px = 96, .max_pixels = 96 * 64}).width_px, 96u);
 }
 
