@@ -27,7 +27,7 @@ export interface InTimeRequest {
   displayedPx: number;
   /** The scale that is enough. */
   wanted: number;
-  /** A finer one takes its place, up to this one, where time is left and the picture much better; left out: none. */
+  /** The finest that takes its place where time is left and the picture is much better; left out: none. */
   finest?: number;
   /** Only this one. */
   only?: boolean;

@@ -67,7 +67,7 @@ export function scaleAt(steps: readonly ManifestStep[], displayedPx: number): nu
   return steps.length === 0 ? 0 : steps[steps.length - 1].scale;
 }
 
-/** The finest scale whose triangles show at a displayed height, however much the step function calls enough. */
+/** The finest scale whose triangles show at a displayed height, whatever the step function calls enough. */
 export function finestShown(scales: readonly ManifestScale[], displayedPx: number): number {
   const shown = scales.find((s) => s.triangles * leastTrianglePx2 <= displayedPx * displayedPx);
   return (shown ?? scales[scales.length - 1])?.scale ?? 0;

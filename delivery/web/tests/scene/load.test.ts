@@ -119,7 +119,8 @@ describe('a load', () => {
   });
   it('refines the mesh, too', async () => {
     const { scales, steps: [{ upToPx }] } = reader.manifest;
-    const l = await loading(url, fakeServer(files), { time: Infinity, autoRefine: false, display: () => upToPx });
+    const l = await loading(url, fakeServer(files),
+      { time: Infinity, autoRefine: false, display: () => upToPx });
     await l.model.done;
     expect(l.model.state.wantedScale).toBeGreaterThan(0);
     await l.model.refine();
