@@ -17,7 +17,7 @@ export class ShownScale {
   shown = noScale;
   wanted = noScale;
   readonly proxy: ShownProxy;
-  /** Gives the scale that is enough at a displayed height, or the finest; set once the documents are there. */
+  /** Gives the scale that is enough at a displayed height, or the finest; set when the documents are there. */
   scaleFor?: (heightPx: number, part: VisiblePart | undefined, finest?: boolean) => number;
   private retryScale_ = noScale;
   private retryTimer_: ReturnType<typeof setTimeout> | undefined;
@@ -101,7 +101,7 @@ export class ShownScale {
     this.place_();
     this.proxy.dispose();
   }
-  /** The scale that the view asks for, by a little more than the last time. A finer one stays while it shows. */
+  /** The scale that the view asks for, by a little more than the last time. A finer one stays if it shows. */
   private scaleForView_(): number {
     const { override, view: { display } } = this.load_;
     const at = (factor: number, finest = false): number =>

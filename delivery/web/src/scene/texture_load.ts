@@ -251,7 +251,9 @@ export class TextureLoad {
       return textures;
     });
     const steps = choiceInTime(planes.data, {
-      displayedPx: display.heightPx, wanted, finest: this.scaleFor_(display.heightPx, display.part, true), only: override.scale !== undefined || !!printed, textures: spend,
+      displayedPx: display.heightPx, wanted,
+      finest: this.scaleFor_(display.heightPx, display.part, true),
+      only: override.scale !== undefined || !!printed, textures: spend,
       connections: client.options.connections,
       memoryBytes: load.memoryBytes, ways: planes.ways,
       afterMesh: (scale) => ({ plan: this.inTime_.planOptions(limitAfterMeshS(scale)), linkBytesS: beta0 }),
@@ -278,7 +280,7 @@ export class TextureLoad {
     if (!again()) await this.scale_.follow(this.refinedScale_());
     this.releaseIfBetter_();
   }
-  /** What passes for S_0 still differs from it: the coarsest scale that hardly does, or the finest that shows. */
+  /** What passes for S_0 still differs from it: the coarsest scale that hardly does, or the finest shown. */
   private refinedScale_(): number {
     const { scale_: { wanted }, planes_: { data: { quality } },
       load_: { override, view: { display: { heightPx, part } }, reader: { manifest: { scales } } } } = this;
