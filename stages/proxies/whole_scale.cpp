@@ -174,7 +174,8 @@ const ScaleFrames& WholeScales::frames_of(std::size_t scale, const RunContext& c
 
 ScaleCoding WholeScales::coding_of(const MeshChoice& mesh, const RunContext& context) {
   const ScaleFineness& how = kScaleFineness[mesh.coding];
-  if (!coding_) coding_.emplace(make_coding(source_.scales.mesh, materials_, source_.images, ScalesOptions{}));
+  if (!coding_)
+    coding_.emplace(make_coding(source_.scales.mesh, materials_, source_.images, ScalesOptions{}));
   ScaleCoding out = *coding_;
   out.frames = frames_of(mesh.scale, context);
   out.options.normal_bits = how.normal_bits;

@@ -67,8 +67,8 @@ class WholeScales {
   double scans_share_ = 0.95;  // of the bytes of one scan, what images of several take
   std::optional<ReferenceViews> views_;
   std::optional<TextureCurves> curves_;
-  std::map<std::size_t, double> scale_flips_;                  // of those looked at, by scale
-  std::optional<ScaleCoding> coding_;                          // as fine as files for viewers are, without frames
+  std::map<std::size_t, double> scale_flips_;  // of those looked at, by scale
+  std::optional<ScaleCoding> coding_;          // as fine as files for viewers are, without frames
   std::optional<std::pair<std::size_t, ScaleFrames>> frames_;  // of the scale that was last asked for
   std::map<MeshChoice, double> file_bytes_;                    // of files without images
   std::vector<double> estimates_;                              // of meshes' bytes, by scale

@@ -246,8 +246,8 @@ DeliveryPlan plan_at_scale(TextureLoss& loss, const DeliveryRequest& request, in
   return plan;
 }
 
-/// The scale of finest .. end - 1 that looks best in the time, if it looks better than `best` does: of a scale
-/// that is enough for the display by much.
+/// The scale of finest .. end - 1 that looks best in the time, if it looks better than `best` does: of a
+/// scale that is enough for the display by much.
 void take_scale(TextureLoss& loss, const DeliveryRequest& request, int finest, int end,
                 std::optional<DeliveryPlan>& best) {
   bool is_enough = best.has_value();
@@ -255,7 +255,7 @@ void take_scale(TextureLoss& loss, const DeliveryRequest& request, int finest, i
     if (s.scale < finest || s.scale >= end) continue;
     // A mesh that comes too late is no picture in the time.
     const bool needed = !best || best->mesh_s >= request.time_limit_s;
-    const double most = needed ? std::numeric_limits<double>::infinity()
+    const double most = needed      ? std::numeric_limits<double>::infinity()
                         : is_enough ? kFinerPays * best->flip
                                     : best->flip - kWorthwhileFlip;
     if (picture_flip(loss.package().quality(), request.displayed_px, s.scale, {}) >= most) continue;
@@ -390,7 +390,8 @@ DeliveryPlan plan_delivery(PackageReader& package, const DeliveryRequest& reques
     best.warnings.push_back("S_" + std::to_string(wanted) +
                             " would suit the display, but in this time a proxy looks better");
   else if (best.scale < wanted)
-    best.warnings.push_back("S_" + std::to_string(wanted) + " would do for the display, but time is left for S_" +
+    best.warnings.push_back("S_" + std::to_string(wanted) +
+                            " would do for the display, but time is left for S_" +
                             std::to_string(best.scale) + ", which looks better");
   else if (best.scale != wanted)
     best.warnings.push_back("S_" + std::to_string(wanted) + " would suit the display, but in this time S_" +

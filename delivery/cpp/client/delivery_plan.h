@@ -72,9 +72,9 @@ struct DeliveryPlan {
 /// What comes within a time limit, mesh first, then textures. The scale is the rule's. A coarser scale takes
 /// its place where the rule's mesh comes too late, or where simulations of both scales show that the coarser
 /// one gives the better picture in the time. By kFlip a finer one does where time is left and its picture is
-/// much better, up to finest_shown(): what passes for S_0 still differs from it. A proxy that cannot be told from S_0 at the displayed height, or
-/// that looks better than what scales give in the time, takes the place of all; not where the request says a
-/// scale, and not the former where it asks for another rule than kFlip.
+/// much better, up to finest_shown(): what passes for S_0 still differs from it. A proxy that cannot be told
+/// from S_0 at the displayed height, or that looks better than what scales give in the time, takes the place
+/// of all; not where the request says a scale, and not the former where it asks for another rule than kFlip.
 /// Textures are those that look best in the bytes that the link gives in the time left; where a simulation
 /// shows a picture farther off than these could, also those for fewer bytes, and what looks better stays.
 /// Fragments come in groups, as clients ask for them (decide/request_groups.h); one by one with

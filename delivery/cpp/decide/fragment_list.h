@@ -28,9 +28,9 @@ struct FragmentList {
 inline constexpr double kHighestPrinted = 97;
 
 struct ListOptions {
-  int scale = 0;                              // number of a scale of the package
-  double displayed_px = 1000;                 // > 0: height of the object
-  double gamma = -1;                          // of q_i(x, y); -1 = the mean of eta
+  int scale = 0;                               // number of a scale of the package
+  double displayed_px = 1000;                  // > 0: height of the object
+  double gamma = -1;                           // of q_i(x, y); -1 = the mean of eta
   double quality_low = 5, quality_high = 100;  // limits, see HtcOptions::hard_limits
   /// > 0: what a group's losses weigh beside the others', see TextureBudget.
   PerGroup group_weights{1, 1, 1};

@@ -136,7 +136,7 @@ export function planDelivery(data: PackageData, request: DeliveryRequest): Deliv
   }
   const asked = wantedScale(manifest, request);
   const wanted = only ? asked : scaleWithin(manifest.scales, asked, memoryBytes);
-  const finest = !only && rule === 'flip'
+  const finest = rule === 'flip'
     ? scaleWithin(manifest.scales, finestShown(manifest.scales, displayedPx), memoryBytes) : undefined;
   const steps = choiceInTime(data, {
     displayedPx, wanted, finest, only, textures, memoryBytes, connections: link.connections,

@@ -127,6 +127,6 @@ export function* choiceInTime(data: PackageData,
   const loss = new TextureLoss(data, request.displayedPx);
   const best = yield* betterScale(loss, request, wanted, only ? wanted + 1 : Infinity);
   // Where textures are not all that is off.
-  return best?.scale === wanted && best.textureFlip < finerPays * best.flip
+  return !only && best?.scale === wanted && best.textureFlip < finerPays * best.flip
     ? yield* betterScale(loss, request, finest, wanted, best) : best;
 }

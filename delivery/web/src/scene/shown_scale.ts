@@ -17,7 +17,7 @@ export class ShownScale {
   shown = noScale;
   wanted = noScale;
   readonly proxy: ShownProxy;
-  /** Gives the scale that is enough at a displayed height, or the finest; set when the documents are there. */
+  /** The scale that is enough at a displayed height, or the finest; set once the documents are there. */
   scaleFor?: (heightPx: number, part: VisiblePart | undefined, finest?: boolean) => number;
   private retryScale_ = noScale;
   private retryTimer_: ReturnType<typeof setTimeout> | undefined;
