@@ -191,11 +191,11 @@ int FileResolver::open_beside(const std::string& uri) {
     const fs::path root = fs::canonical(roots_[i], ec);
     if (ec || *both.lexically_relative(root).begin() == "..") continue;
     const Descriptor folder(::open(both.c_str(), O_PATH | O_DIRECTORY | O_CLOEXEC));
-    return folder.get() < 0 ? -1 : open_beneath(folder.get(), uri.substr(3));
+    if (folder.get() >= 0) return open_beneath(folder.get(), uri.substr(3));
   }
-  if (!fs::is_directory(both / kTexturesBeside.substr(3), ec)) return -1;
+  if (!fs::is_directory(both / kTexturesBeside.substr(3), ec)) return errno = ENOENT, -1;
   throw FileRefused(uri, "", kRegularFile,
-                    "a file beside the model's folder: compile the folder of both, or a ZIP archive of it");
+                    "a file beside the model's folder: compile the folder of both, or give a ZIP archive of it");
 }
 
 /// Opens a uri that has a number; -1 when there is no such file.
@@ -206,7 +206,6 @@ int FileResolver::open_regular(const std::string& uri) {
   } catch (const InputError& e) {
     throw FileRefused(uri, "", e.expected(), e.found());
   }
-  errno = ENOENT;  // of open_beside()
   const int fd = beside ? open_beside(uri) : open_beneath(folder_, uri);
   if (fd >= 0) return fd;
   if (beside && (errno == ELOOP || errno == EXDEV)) return -1;

@@ -109,7 +109,7 @@ test('the camera turns during the timed part: what is refined then is what it lo
 test('coming nearer during a load: it ends in time, with what the new view asks for', () => throttled({}, async (page, link, url) => {
   await lab(page, () => window.lab.start({size: 900, zoom: 0.4}));
   const starved = starvation();
-  const id = await lab(page, (u) => window.lab.load(u, {load: {time: 3}}), url);
+  const id = await lab(page, (u) => window.lab.load(u, {load: {time: 3, rule: 'error'}}), url);
   await until(page, (i) => window.lab.report(i).events.some((e) => e.name === 'fragment'), id);
   const far = (await lab(page, (i) => window.lab.report(i), id)).state.wantedScale;
   await lab(page, () => {

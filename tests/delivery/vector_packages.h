@@ -229,8 +229,10 @@ inline Json plans(PackageReader& package, const KnowsPolicy& knows) {
     r.htc = o.htc;
     out.push_back(plan_json(package, policy.c_str(), r));
   };
-  for (const double memory_bytes : {5e4, 3e5, 2e6}) {
+  for (const auto& [memory_bytes, px] : {std::pair{5e4, 1000.0}, {3e5, 1000.0}, {2e6, 1000.0}, {3e5, 60.0},
+                                         {3e5, 400.0}}) {
     DeliveryRequest r;
+    r.displayed_px = px;
     r.time_limit_s = 4;
     r.network.link = BandwidthTrace::constant(3e5);
     r.network.rtt_s = 0.01;

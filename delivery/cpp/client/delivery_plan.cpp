@@ -10,8 +10,9 @@ constexpr double kWorthwhileFlip = 1e-4;  // a coarser scale must look better, n
 // Where a picture is so many times as far off as its bytes could show, textures are chosen again for so much
 // of the bytes.
 constexpr double kFarFromPlanned = 1.05, kFewerBytes = 0.7;
-// A scale finer than the rule's takes the time that is left where its picture is at most so far off.
-constexpr double kFinerPays = 0.9;
+// A scale finer than the rule's takes the time that is left where its picture is at most so far off, and
+// where its mesh leaves so much of the time to the textures.
+constexpr double kFinerPays = 0.9, kFinerLeaves = 0.5;
 
 /// Of the textures' rungs in the plan.
 void rate(PackageReader& package, double displayed_px, const FragmentList& list, DeliveryPlan& plan) {
@@ -246,11 +247,12 @@ DeliveryPlan plan_at_scale(TextureLoss& loss, const DeliveryRequest& request, in
   return plan;
 }
 
-/// The scale of finest .. end - 1 that looks best in the time, if it looks better than `best` does: of a
+/// The scale of finest .. end - 1 that looks best in the time, if it looks better than `best` does: than a
 /// scale that is enough for the display by much.
 void take_scale(TextureLoss& loss, const DeliveryRequest& request, int finest, int end,
                 std::optional<DeliveryPlan>& best) {
   bool is_enough = best.has_value();
+  const double least_left_s = best ? kFinerLeaves * (request.time_limit_s - best->mesh_s) : 0;
   for (const ManifestScale& s : loss.package().manifest().scales) {
     if (s.scale < finest || s.scale >= end) continue;
     // A mesh that comes too late is no picture in the time.
@@ -260,7 +262,8 @@ void take_scale(TextureLoss& loss, const DeliveryRequest& request, int finest, i
                                     : best->flip - kWorthwhileFlip;
     if (picture_flip(loss.package().quality(), request.displayed_px, s.scale, {}) >= most) continue;
     DeliveryPlan plan = plan_at_scale(loss, request, s.scale);
-    if (!needed && (plan.flip >= most || plan.mesh_s >= request.time_limit_s)) continue;
+    const double left_s = request.time_limit_s - plan.mesh_s;
+    if (!needed && (plan.flip >= most || left_s <= 0 || left_s < least_left_s)) continue;
     best = std::move(plan);
     is_enough = false;
   }
@@ -274,7 +277,8 @@ std::optional<DeliveryPlan> scale_in_time(TextureLoss& loss, const DeliveryReque
   std::optional<DeliveryPlan> best;
   take_scale(loss, request, enough, only ? enough + 1 : scales.back().scale + 1, best);
   const bool by_pictures = !only && request.rule == StepRule::kFlip && !(request.jnd > 0);
-  if (by_pictures && best && best->scale == enough && best->texture_flip < kFinerPays * best->flip) {
+  if (by_pictures && best && best->scale == enough && best->mesh_s < request.time_limit_s &&
+      best->texture_flip < kFinerPays * best->flip) {
     const int finest = finest_shown(scales, request.displayed_px);
     take_scale(loss, request, scale_within(scales, finest, request.memory_bytes), enough, best);
   }

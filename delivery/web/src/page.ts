@@ -326,7 +326,7 @@ export class TexmeshPage {
     for (const model of this.dirty_) {
       if (!model.load || model.phase === 'opening') continue; // begin() asks again
       if (!model.place.visible) continue; // coming into view asks again
-      model.load.update(model.camera);
+      model.look();
       if (this.painter_.draw(model.scene, model.camera, model.canvas)) model.painted();
     }
     this.dirty_.clear();

@@ -1,5 +1,6 @@
 import { describe, expect, it } from 'vitest';
 import type { PageModel, PageModelOptions } from '../src/page';
+import { defaultOrbit } from '../src/page/framing';
 import { type Fault, fakeServer } from './support/fake_server';
 import { type FakeCanvas, withPage } from './support/fake_page';
 import { decodeNothing, until } from './support/loading';
@@ -40,6 +41,22 @@ describe('a page', () => {
       // Beginnings came first: of every package before the second request for any.
       expect(new Set(server.log.slice(0, 8).map((l) => l.url)).size).toBe(8);
       expect(page.gpuBytes).toBe(models.reduce((sum, m) => sum + m.gpuBytes, 0));
+    }));
+  it('refines what another view shows', () =>
+    withPage({ time: 0.2 }, async ({ page, canvas }) => {
+      const { how } = options();
+      const model = page.add(canvas(), url, how);
+      expect(await until(() => model.complete)).toBe(true);
+      const load = model.load!;
+      const { refine } = load;
+      let rounds = 0;
+      load.refine = () => (++rounds, refine());
+      for (const turned of [180, 0]) {
+        model.frame({ ...defaultOrbit, thetaDegrees: defaultOrbit.thetaDegrees + turned });
+        expect(await until(() => !model.complete)).toBe(true);
+        expect(await until(() => model.complete)).toBe(true);
+      }
+      expect(rounds).toBe(2);
     }));
   it('keeps within its memory', () =>
     withPage({ time: 2, memoryBytes: 1e6 }, async ({ page, canvas }) => {

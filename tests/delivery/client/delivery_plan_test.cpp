@@ -156,6 +156,9 @@ TEST(DeliveryPlan, TimeThatIsLeftGoesIntoAFinerScale) {
   other = fast;
   other.memory_bytes = 1;
   EXPECT_EQ(scale(other), 9) << "no memory for it";
+  const DeliveryRequest late = request(60, 3e4, 0.5);
+  EXPECT_EQ(wanted_scale(package, late), 9);
+  EXPECT_EQ(scale(late), 9) << "no time is left even behind the coarsest";
 }
 
 TEST(DeliveryPlan, AProxyThatLooksWorseIsNotShown) {

@@ -79,6 +79,7 @@ TEST(FragmentList, OnlyPrintedListsLeaveTheHighestRungs) {
   quality.back() = 100;
   PackageReader package(open_container(memory_source(parts.build())));
   ListOptions options;
+  ASSERT_FALSE(fragment_list(package, full_size(package), options).offers.empty());
   for (const FragmentOffer& f : fragment_list(package, full_size(package), options).offers)
     EXPECT_EQ(f.high_rung, quality.size() - 1) << "it may be the source's own";
   options.thesis = true;

@@ -149,8 +149,9 @@ std::string note_of(const std::map<const CLI::App*, std::string>& notes, const C
 
 std::string group_alone(const CLI::App& app, const std::string& name, const HelpNotes& notes) {
   std::string out = fmt::format("{}, {}:\n", name, notes.only_group);
+  std::vector<const CLI::Option*> shown;
   for (const CLI::Option* o : app.get_options())
-    if (o->get_group() == notes.only_group) out += option_line(*o, nullptr, notes);
+    if (o->get_group() == notes.only_group) out += option_line(*o, nullptr, notes, shown), shown.push_back(o);
   return out;
 }
 

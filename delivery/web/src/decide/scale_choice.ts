@@ -1,4 +1,4 @@
-import { farFromPlanned, fewerBytes, finerPays, worthwhileFlip } from '../format/shared_numbers';
+import { farFromPlanned, fewerBytes, finerLeaves, finerPays, worthwhileFlip } from '../format/shared_numbers';
 import { PackageData } from '../format/tables';
 import { FragmentList, lossesOf } from './fragment_list';
 import { type BytesOf, planesWithin } from './gpu_memory';
@@ -95,12 +95,14 @@ function* texturesInTime(loss: TextureLoss, request: InTimeRequest, scale: numbe
 }
 
 /**
- * The scale of finest .. end - 1 that looks best in the time, if it looks better than `enough` does: of a
+ * The scale of finest .. end - 1 that looks best in the time, if it looks better than `enough` does: than a
  * scale that is enough for the display by much.
  */
 function* betterScale(loss: TextureLoss, request: InTimeRequest, finest: number, end: number,
     enough?: InTime): Generator<void, InTime | undefined> {
   const { data: { manifest, quality }, displayedPx } = loss;
+  const leftS = (scale: number): number => request.afterMesh(scale).plan.timeLimitS;
+  const leastLeftS = enough ? finerLeaves * leftS(enough.scale) : 0;
   let best = enough;
   for (const { scale } of manifest.scales) {
     if (scale < finest || scale >= end) continue;
@@ -110,7 +112,7 @@ function* betterScale(loss: TextureLoss, request: InTimeRequest, finest: number,
     // With the source's texels.
     if (geometryFlip(quality, displayedPx, scale) >= most) continue;
     const now = yield* texturesInTime(loss, request, scale);
-    if (most === Infinity || (now.flip < most && !now.late)) best = now;
+    if (most === Infinity || (now.flip < most && !now.late && !(leftS(scale) < leastLeftS))) best = now;
   }
   return best;
 }
@@ -127,6 +129,20 @@ export function* choiceInTime(data: PackageData,
   const loss = new TextureLoss(data, request.displayedPx);
   const best = yield* betterScale(loss, request, wanted, only ? wanted + 1 : Infinity);
   // Where textures are not all that is off.
-  return !only && best?.scale === wanted && best.textureFlip < finerPays * best.flip
+  return !only && best?.scale === wanted && !best.late && best.textureFlip < finerPays * best.flip
     ? yield* betterScale(loss, request, finest, wanted, best) : best;
+}
+
+/** FLIP of a scale beside S_0 at which refining takes no finer one. */
+const refinedFlip = 0.01;
+
+/**
+ * What passes for S_0 still differs from it: from `finest` on the coarsest scale that hardly does, else
+ * `finest`.
+ */
+export function refinedScale({ manifest: { scales }, quality }: PackageData, displayedPx: number,
+    finest: number): number {
+  const alike = scales.filter(
+    ({ scale }) => scale >= finest && geometryFlip(quality, displayedPx, scale) <= refinedFlip);
+  return alike.at(-1)?.scale ?? finest;
 }

@@ -138,6 +138,7 @@ export const worthwhileFlip = 0.0001; // a coarser scale must look better, not o
 export const farFromPlanned = 1.05;
 export const fewerBytes = 0.7;
 export const finerPays = 0.9;
+export const finerLeaves = 0.5;
 /** Square pixels that a triangle must have on average to show, of the square of the displayed height. */
 export const leastTrianglePx2 = 1;
 /** Quality of lists as printed, at most. */

@@ -77,6 +77,8 @@ export interface Host {
 
 /** What did not come is asked for again after so long, and twice as long each time; so often at most. */
 const askAgain = { firstS: 4, times: 6 };
+/** What another view shows is fetched so many seconds after the view has changed. */
+const lookS = 0.4;
 /** A package that was replaced while it came is opened anew so often. */
 const mostReplaced = 2;
 
@@ -99,6 +101,8 @@ export class PageModel {
   lacking = false;
   private asked_ = 0; // how often it was asked for again
   private later_?: ReturnType<typeof setTimeout>;
+  private looking_?: ReturnType<typeof setTimeout>; // another view is to be refined
+  private views_ = 0;
   private replaced_ = 0;
   private unpainted_ = false; // the first picture waits for a frame
   private abort_ = new AbortController();
@@ -124,9 +128,17 @@ export class PageModel {
   }
   /** To be called when the camera has moved. */
   moved(): void {
-    this.load?.update(this.camera);
+    this.look();
     this.host_.redraw(this);
     this.host_.changed(this);
+  }
+  /** The load follows the camera. A little later, what another view shows is fetched. */
+  look(): void {
+    if (this.load?.update(this.camera))
+      this.looking_ ??= setTimeout(() => {
+        ++this.views_;
+        this.askForRest_();
+      }, 1000 * lookS);
   }
   /** The camera sees the whole object, as its canvas is now. */
   frame(orbit: Orbit = this.options_.orbit ?? defaultOrbit): void {
@@ -187,7 +199,7 @@ export class PageModel {
   }
   /** Fetches what the display can show beyond the model's turn. */
   async refine(): Promise<void> {
-    const { load } = this;
+    const { load, views_: view } = this;
     this.lacking = false;
     try {
       await load?.refine();
@@ -195,7 +207,7 @@ export class PageModel {
       if (!isAbort(error)) this.say_(error, false);
     }
     if (this.load !== load) return;
-    this.complete = true;
+    this.complete = view === this.views_;
     if (this.lacking) this.askLater_();
     else this.asked_ = 0;
   }
@@ -307,14 +319,17 @@ export class PageModel {
     this.enter_('waiting');
   }
   private askForRest_(): void {
-    clearTimeout(this.later_);
-    this.later_ = undefined;
+    this.forgetLater_();
     this.complete = false;
     this.host_.changed(this);
   }
-  private end_(): void {
+  private forgetLater_(): void {
     clearTimeout(this.later_);
-    this.later_ = undefined;
+    clearTimeout(this.looking_);
+    this.later_ = this.looking_ = undefined;
+  }
+  private end_(): void {
+    this.forgetLater_();
     this.abort_.abort();
     const { load } = this;
     this.load = undefined;

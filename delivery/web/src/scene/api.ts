@@ -83,7 +83,7 @@ export interface LoadOptions {
   meshes?: 'glb' | 'stream' | 'auto';
   /** Whether the load goes on after the deadline until the display can show no more. Default true. */
   autoRefine?: boolean;
-  /** Refining ends where 1 - SSIM of a fragment is no more than this. Default 0.003: not to be seen. */
+  /** Refining fetches no fragment whose 1 - SSIM is no more than this. Default 0.003: not to be seen. */
   refineTo?: number;
   /** Address of worker.js, where that file does not stand beside the library. */
   workerUrl?: string | URL;
@@ -212,7 +212,7 @@ export interface LoadState {
   scale: number;
   /** Proxy in the scene, instead of a scale; -1: none. */
   proxy: number;
-  /** Scale that the display asks for. */
+  /** Scale that is shown, or comes: what the display asks for, or what time and refining allow. */
   wantedScale: number;
   /** Displayed height that decides, device px. */
   displayedPx: number;
@@ -244,10 +244,13 @@ export interface LoadedModel {
   on<K extends keyof LoadEvents>(name: K, listener: (event: LoadEvents[K]) => void): () => void;
   /**
    * Follows the view: to be called for every frame, or when the camera moves. Picks the scale (with
-   * hysteresis), finer planes, and fragments to refine first. Cheap when nothing has changed.
+   * hysteresis), finer planes, and fragments to refine first. Cheap when nothing has changed: false.
    */
-  update(camera?: Camera): void;
-  /** Fetches fragments that the display can show but the time did not allow; resolves when none is left. */
+  update(camera?: Camera): boolean;
+  /**
+   * Fetches fragments, planes and a finer mesh that the display can show but the time did not allow; resolves
+   * when none is left.
+   */
   refine(): Promise<void>;
   /**
    * Changes scale and rung that were chosen at loading; fetches at once, or when the timed part is over, and

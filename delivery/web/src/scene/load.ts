@@ -301,9 +301,11 @@ class ModelLoad {
 
   // ---- following the view
 
-  update(camera: LoadContext['view']['camera']): void {
+  update(camera: LoadContext['view']['camera']): boolean {
     const { context } = this;
-    if (!context.signal.aborted && context.lookFrom(camera) && context.resting) this.follow_();
+    const isOther = !context.signal.aborted && context.lookFrom(camera);
+    if (isOther && context.resting) this.follow_();
+    return isOther;
   }
   setOverride(override: { scale?: number; rung?: number }): void {
     this.context.override = this.context.snapped(override);

@@ -56,7 +56,7 @@ export class ShownScale {
       this.lost(error, scale);
     }
   }
-  /** The shown scale stays. A little later, the lost or the then wanted scale is asked for again. */
+  /** The shown scale stays. A little later, the lost scale is asked for again, or what the view then asks for. */
   lost(error: unknown, scale: number): void {
     this.load_.fail(error, `scale ${scale}`);
     if (this.wanted === scale) this.wanted = this.shown;
@@ -65,7 +65,7 @@ export class ShownScale {
     this.retryScale_ = scale;
     this.retryTimer_ = setTimeout(() => {
       this.retryScale_ = noScale;
-      void this.follow(this.load_.resting ? undefined : scale);
+      void this.follow(this.load_.resting ? this.scaleForView_(scale) : scale);
     }, 1000 * this.retryS_);
     this.retryS_ = Math.min(2 * this.retryS_, retryScaleS.most);
   }
@@ -102,11 +102,11 @@ export class ShownScale {
     this.proxy.dispose();
   }
   /** The scale that the view asks for, by a little more than the last time. A finer one stays if it shows. */
-  private scaleForView_(): number {
+  private scaleForView_(wanted = this.wanted): number {
     const { override, view: { display } } = this.load_;
     const at = (factor: number, finest = false): number =>
       override.scale ?? this.scaleFor!(display.heightPx * factor, display.part, finest);
-    if (override.scale !== undefined || at(1 / hysteresis) < this.wanted) return at(1);
-    return at(hysteresis, true) <= this.wanted ? this.wanted : Math.max(at(hysteresis), this.wanted);
+    if (override.scale !== undefined || at(1 / hysteresis) < wanted) return at(1);
+    return Math.max(wanted, Math.min(at(hysteresis), at(hysteresis, true)));
   }
 }

@@ -1,12 +1,11 @@
 import { type FragmentList, type ListOptions, lossesOf } from '../decide/fragment_list';
 import { scaleWithin } from '../decide/gpu_memory';
-import { proxyBytes } from '../decide/gpu_size';
+import { proxyBytes, scaleBytes } from '../decide/gpu_size';
 import { clamp } from '../decide/numbers';
-import { geometryFlip } from '../decide/prediction';
 import { proxyBytesBeyondStart, proxyLoss } from '../decide/proxy_choice';
 import { proxyStep } from '../decide/proxy_steps';
 import { throughputOf } from '../decide/request_groups';
-import { choiceInTime } from '../decide/scale_choice';
+import { choiceInTime, refinedScale } from '../decide/scale_choice';
 import { type PlaneChoice, pictureFlip } from '../decide/texture_loss';
 import { type VisiblePart, finestShown, selectScale } from '../decide/viewing';
 import { throwIfAborted } from '../format/errors';
@@ -73,8 +72,6 @@ const unseen = 1e-3;
 const showShare = 0.6;
 /** 1 - SSIM at which refining ends by default. */
 const defaultRefineTo = 0.003;
-/** FLIP of a scale beside S_0 at which refining takes no finer one. */
-const refinedFlip = 0.01;
 /** Refining ends where so many rounds have brought nothing. */
 const mostFruitlessRounds = 3;
 
@@ -94,6 +91,7 @@ export class TextureLoad {
   private lookedS_ = 0; // when the proxy and the scale were compared last
   private had_?: PlaneComposer[]; // what the GPU has lost and is being made anew
   private restores_ = 0;
+  private finer_ = Promise.resolve(); // the mesh that refining ends with
   private fruitlessRounds_ = 0; // rounds of refining that brought nothing, one after the other
 
   constructor(private readonly load_: LoadContext, private readonly scale_: ShownScale,
@@ -236,9 +234,12 @@ export class TextureLoad {
     const { load_: load, planes_: planes, fetching_: fetching } = this;
     const { override, options, limitS, beta0, reader: { client }, view: { display } } = load;
     const wanted = override.scale ?? this.scaleFor_(display.heightPx, display.part);
-    await planes.considerCompression(wanted);
-    if (options.fullSize || !Number.isFinite(limitS) || override.rung !== undefined)
-      return { scale: wanted, planes: planes.forDisplay() };
+    const finest = this.scaleFor_(display.heightPx, display.part, true);
+    await planes.considerCompression(Math.min(wanted, finest));
+    if (options.fullSize || !Number.isFinite(limitS) || override.rung !== undefined) {
+      const scale = options.autoRefine === false ? this.refinedScale_(wanted) : wanted; // else refining ends so
+      return { scale, planes: planes.forDisplay() };
+    }
     /** Seconds that so many bytes of mesh take when nothing shares the link. */
     const meshS = (bytes: number): number => (bytes > 0 ? bytes / beta0 + client.latencyS : 0);
     const limitAfterMeshS = (scale: number): number =>
@@ -251,9 +252,7 @@ export class TextureLoad {
       return textures;
     });
     const steps = choiceInTime(planes.data, {
-      displayedPx: display.heightPx, wanted,
-      finest: this.scaleFor_(display.heightPx, display.part, true),
-      only: override.scale !== undefined || !!printed, textures: spend,
+      displayedPx: display.heightPx, wanted, finest, only: override.scale !== undefined || !!printed, textures: spend,
       connections: client.options.connections,
       memoryBytes: load.memoryBytes, ways: planes.ways,
       afterMesh: (scale) => ({ plan: this.inTime_.planOptions(limitAfterMeshS(scale)), linkBytesS: beta0 }),
@@ -277,18 +276,26 @@ export class TextureLoad {
     await this.showFinerPlanes_();
     while (!again() && (await this.refineSome_()));
     if (!again()) await this.fetching_.composed();
-    if (!again()) await this.scale_.follow(this.refinedScale_());
+    this.releaseIfBetter_();
+    if (again()) return;
+    const finer = this.refinedScale_();
+    if (finer !== this.scale_.wanted) this.finer_ = this.scale_.follow(finer);
+    // A mesh on its way keeps no other view waiting.
+    let isThere = false;
+    void this.finer_.then(() => (isThere = true));
+    while (!isThere && !again()) await Promise.race([this.finer_, sleepS(lookEachS)]);
+    if (isThere && !this.scale_.held) this.source_.leaveGpu(false);
     this.releaseIfBetter_();
   }
-  /** What passes for S_0 still differs from it: the coarsest scale that hardly does, or the finest shown. */
-  private refinedScale_(): number {
-    const { scale_: { wanted }, planes_: { data: { quality } },
-      load_: { override, view: { display: { heightPx, part } }, reader: { manifest: { scales } } } } = this;
+  /** The scale that refining ends with, within the memory that planes leave. */
+  private refinedScale_(enough = this.scale_.wanted): number {
+    const { planes_: { data, gpuBytes }, load_: { override, memoryBytes, view: { display } } } = this;
+    const { heightPx, part } = display;
     const finest = this.scaleFor_(heightPx, part, true);
-    if (override.scale !== undefined || finest === this.scaleFor_(heightPx, part)) return wanted;
-    const alike = scales.filter(
-      ({ scale }) => scale >= finest && geometryFlip(quality, heightPx, scale) <= refinedFlip);
-    return Math.min(wanted, alike.at(-1)?.scale ?? finest);
+    if (override.scale !== undefined || finest === this.scaleFor_(heightPx, part)) return enough;
+    const fitting =
+      data.manifest.scales.find((s) => s.scale >= finest && gpuBytes + scaleBytes(s) <= memoryBytes);
+    return Math.min(enough, refinedScale(data, heightPx, fitting?.scale ?? enough));
   }
   /**
    * After the GPU has lost everything, or has refused something: shows previews within the memory that there

@@ -1,5 +1,5 @@
 import { expect, it } from 'vitest';
-import { choiceInTime } from '../../src/decide/scale_choice';
+import { choiceInTime, refinedScale } from '../../src/decide/scale_choice';
 import { defaultTimePlan, setUp } from '../support/transferring';
 
 it('a coarser scale is taken where little time is left, and only where it looks better', async () => {
@@ -19,4 +19,34 @@ it('a coarser scale is taken where little time is left, and only where it looks 
   expect(rushed.scale).toBeGreaterThan(0);
   expect(rushed).toMatchObject({ late: false });
   expect(rushed.flip).toBeGreaterThan(rushed.textureFlip);
+});
+
+it('a finer scale than enough is taken where it leaves time, and never where one is asked for', async () => {
+  const { data } = await setUp();
+  const enough = data.manifest.scales[2].scale;
+  const choose = (limitS: (scale: number) => number, more: object) => {
+    const steps = choiceInTime(data, {
+      displayedPx: 1000, wanted: enough, connections: 6, ...more,
+      afterMesh: (scale) => ({ plan: { ...defaultTimePlan, timeLimitS: limitS(scale) }, linkBytesS: 1e5 }),
+    });
+    for (;;) {
+      const { done, value } = steps.next();
+      if (done) return value!.scale;
+    }
+  };
+  expect(choose(() => 100, {})).toBe(enough);
+  expect(choose(() => 100, { finest: 0 })).toBe(0);
+  expect(choose(() => 100, { finest: 0, only: true })).toBe(enough);
+  expect(choose((scale) => (scale < enough ? 49 : 100), { finest: 0 })).toBe(enough);
+  expect(choose(() => -1, { finest: 0 })).toBeGreaterThanOrEqual(enough); // late, all of them
+});
+
+it('refining ends with the coarsest scale that hardly differs from the finest', async () => {
+  const { data } = await setUp();
+  const { scales } = data.manifest;
+  const rows = (flip: (scale: number) => number) => ({ ...data, quality: { ...data.quality,
+    geometry: data.quality.geometry.map((g) => ({ ...g, flip: Float32Array.from(data.quality.scales, flip) })) } });
+  expect(refinedScale(rows((s) => 0.001 * s), 500, 0)).toBe(scales.filter((s) => s.scale <= 10).at(-1)!.scale);
+  expect(refinedScale(rows((s) => (s ? 0.02 : 0)), 500, 0)).toBe(0);
+  expect(refinedScale(rows((s) => (s ? 0.02 : 0)), 500, scales[1].scale)).toBe(scales[1].scale);
 });

@@ -1,7 +1,7 @@
 import { type BufferGeometry, type EventDispatcher, type Material, type Mesh, PerspectiveCamera,
   SphereGeometry } from 'three';
 import { describe, expect, it } from 'vitest';
-import { stepFunction } from '../../src/decide/viewing';
+import { selectScale, stepFunction } from '../../src/decide/viewing';
 import { InputError, PackageReader } from '../../src/reader';
 import { fakeServer } from '../support/fake_server';
 import { golden } from '../support/files';
@@ -106,9 +106,8 @@ describe('a load', () => {
   it('takes a finer scale where time is left, and keeps it as long as its triangles show', async () => {
     const { scales, steps: [{ scale, upToPx }] } = reader.manifest;
     let px = upToPx;
-    const l = await loading(url, fakeServer(files), { time: 3, display: () => px });
+    const l = await loading(url, fakeServer(files), { time: 3, autoRefine: false, display: () => px });
     await l.model.done;
-    await l.model.refine();
     expect(l.model.state.wantedScale).toBe(0);
     for (const [now, shown] of [[Math.sqrt(scales[0].triangles), 0], [1, scale]]) {
       px = now;
@@ -118,16 +117,31 @@ describe('a load', () => {
     l.dispose();
   });
   it('refines the mesh, too', async () => {
-    const { scales, steps: [{ upToPx }] } = reader.manifest;
-    const l = await loading(url, fakeServer(files),
-      { time: Infinity, autoRefine: false, display: () => upToPx });
-    await l.model.done;
-    expect(l.model.state.wantedScale).toBeGreaterThan(0);
-    await l.model.refine();
-    const finest = scales.find((s) => s.triangles <= upToPx * upToPx)!.scale;
-    expect(l.model.state.wantedScale).toBeLessThan(reader.manifest.steps[0].scale);
-    expect(l.model.state.wantedScale).toBeGreaterThanOrEqual(finest);
-    l.dispose();
+    const { steps: [{ scale, upToPx }] } = reader.manifest;
+    for (const rule of ['flip', 'edge'] as const) {
+      const l = await loading(url, fakeServer(files), { time: 0, rule, autoRefine: false, display: () => upToPx });
+      await l.model.done;
+      const before = l.model.state.wantedScale;
+      expect(before).toBeGreaterThanOrEqual(scale);
+      await l.model.refine();
+      if (rule === 'flip') expect(l.model.state.wantedScale).toBeLessThan(scale);
+      else expect(l.model.state.wantedScale).toBe(selectScale(reader.manifest, upToPx, undefined, rule));
+      l.dispose();
+    }
+  });
+  it('refines no mesh that takes more than the memory', async () => {
+    const { steps: [{ scale, upToPx }] } = reader.manifest;
+    const leastBytes = 262980; // of its planes
+    for (const memoryBytes of [2.2e5, 3e5, 4e6]) {
+      const l = await loading(url, fakeServer(files),
+        { time: 0, memoryBytes, autoRefine: false, display: () => upToPx });
+      await l.model.done;
+      await l.model.refine();
+      const { gpuBytes, wantedScale } = l.model.state;
+      if (memoryBytes > leastBytes) expect(gpuBytes).toBeLessThanOrEqual(memoryBytes);
+      expect([memoryBytes, wantedScale < scale]).toEqual([memoryBytes, memoryBytes > leastBytes]);
+      l.dispose();
+    }
   });
   it('does not ask again and again for what cannot be had', async () => {
     const server =
