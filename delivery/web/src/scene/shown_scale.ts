@@ -56,7 +56,7 @@ export class ShownScale {
       this.lost(error, scale);
     }
   }
-  /** The shown scale stays. A little later, the lost scale is asked for again, or what the view then asks for. */
+  /** The shown scale stays. Later, the lost one is asked for again, or what the view then asks for. */
   lost(error: unknown, scale: number): void {
     this.load_.fail(error, `scale ${scale}`);
     if (this.wanted === scale) this.wanted = this.shown;

@@ -237,8 +237,8 @@ export class TextureLoad {
     const finest = this.scaleFor_(display.heightPx, display.part, true);
     await planes.considerCompression(Math.min(wanted, finest));
     if (options.fullSize || !Number.isFinite(limitS) || override.rung !== undefined) {
-      const scale = options.autoRefine === false ? this.refinedScale_(wanted) : wanted; // else refining ends so
-      return { scale, planes: planes.forDisplay() };
+      const endsHere = options.autoRefine === false; // else refining ends with the finer one
+      return { scale: endsHere ? this.refinedScale_(wanted) : wanted, planes: planes.forDisplay() };
     }
     /** Seconds that so many bytes of mesh take when nothing shares the link. */
     const meshS = (bytes: number): number => (bytes > 0 ? bytes / beta0 + client.latencyS : 0);
@@ -252,7 +252,8 @@ export class TextureLoad {
       return textures;
     });
     const steps = choiceInTime(planes.data, {
-      displayedPx: display.heightPx, wanted, finest, only: override.scale !== undefined || !!printed, textures: spend,
+      displayedPx: display.heightPx, wanted, finest,
+      only: override.scale !== undefined || !!printed, textures: spend,
       connections: client.options.connections,
       memoryBytes: load.memoryBytes, ways: planes.ways,
       afterMesh: (scale) => ({ plan: this.inTime_.planOptions(limitAfterMeshS(scale)), linkBytesS: beta0 }),

@@ -44,9 +44,13 @@ it('a finer scale than enough is taken where it leaves time, and never where one
 it('refining ends with the coarsest scale that hardly differs from the finest', async () => {
   const { data } = await setUp();
   const { scales } = data.manifest;
-  const rows = (flip: (scale: number) => number) => ({ ...data, quality: { ...data.quality,
-    geometry: data.quality.geometry.map((g) => ({ ...g, flip: Float32Array.from(data.quality.scales, flip) })) } });
-  expect(refinedScale(rows((s) => 0.001 * s), 500, 0)).toBe(scales.filter((s) => s.scale <= 10).at(-1)!.scale);
+  const rows = (of: (scale: number) => number) => {
+    const flip = Float32Array.from(data.quality.scales, of);
+    const geometry = data.quality.geometry.map((g) => ({ ...g, flip }));
+    return { ...data, quality: { ...data.quality, geometry } };
+  };
+  const coarsest = scales.filter((s) => s.scale <= 10).at(-1)!.scale;
+  expect(refinedScale(rows((s) => 0.001 * s), 500, 0)).toBe(coarsest);
   expect(refinedScale(rows((s) => (s ? 0.02 : 0)), 500, 0)).toBe(0);
   expect(refinedScale(rows((s) => (s ? 0.02 : 0)), 500, scales[1].scale)).toBe(scales[1].scale);
 });

@@ -119,7 +119,8 @@ describe('a load', () => {
   it('refines the mesh, too', async () => {
     const { steps: [{ scale, upToPx }] } = reader.manifest;
     for (const rule of ['flip', 'edge'] as const) {
-      const l = await loading(url, fakeServer(files), { time: 0, rule, autoRefine: false, display: () => upToPx });
+      const l = await loading(url, fakeServer(files),
+        { time: 0, rule, autoRefine: false, display: () => upToPx });
       await l.model.done;
       const before = l.model.state.wantedScale;
       expect(before).toBeGreaterThanOrEqual(scale);
