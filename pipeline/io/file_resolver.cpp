@@ -194,8 +194,9 @@ int FileResolver::open_beside(const std::string& uri) {
     if (folder.get() >= 0) return open_beneath(folder.get(), uri.substr(3));
   }
   if (!fs::is_directory(both / kTexturesBeside.substr(3), ec)) return errno = ENOENT, -1;
-  throw FileRefused(uri, "", kRegularFile,
-                    "a file beside the model's folder: compile the folder of both, or give a ZIP archive of it");
+  throw FileRefused(
+      uri, "", kRegularFile,
+      "a file beside the model's folder: compile the folder of both, or give a ZIP archive of it");
 }
 
 /// Opens a uri that has a number; -1 when there is no such file.

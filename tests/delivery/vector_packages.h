@@ -229,8 +229,8 @@ inline Json plans(PackageReader& package, const KnowsPolicy& knows) {
     r.htc = o.htc;
     out.push_back(plan_json(package, policy.c_str(), r));
   };
-  for (const auto& [memory_bytes, px] : {std::pair{5e4, 1000.0}, {3e5, 1000.0}, {2e6, 1000.0}, {3e5, 60.0},
-                                         {3e5, 400.0}}) {
+  for (const auto& [memory_bytes, px] :
+       {std::pair{5e4, 1000.0}, {3e5, 1000.0}, {2e6, 1000.0}, {3e5, 60.0}, {3e5, 400.0}}) {
     DeliveryRequest r;
     r.displayed_px = px;
     r.time_limit_s = 4;
