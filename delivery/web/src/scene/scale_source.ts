@@ -101,10 +101,9 @@ export class ScaleSource {
     const shapes = [...this.shapes_.values(), ...(this.first_ ? [this.first_.scene] : [])];
     return [...new Set(shapes)].filter((shape) => !this.offGpu_.has(shape));
   }
-  /** Takes scales off the GPU: those that are not drawn, or all; those that are drawn get there again. */
-  leaveGpu(drawn = true): void {
+  /** Takes all scales off the GPU; those that are drawn get there again. */
+  leaveGpu(): void {
     for (const shape of this.all()) {
-      if (!drawn && shape.parent) continue;
       disposeGeometries(shape); // of a lost context they are gone already
       if (!shape.parent) this.offGpu_.add(shape);
     }

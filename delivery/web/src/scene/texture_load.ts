@@ -285,7 +285,6 @@ export class TextureLoad {
     let isThere = false;
     void this.finer_.then(() => (isThere = true));
     while (!isThere && !again()) await Promise.race([this.finer_, sleepS(lookEachS)]);
-    if (isThere && !this.scale_.held) this.source_.leaveGpu(false);
     this.releaseIfBetter_();
   }
   /** The scale that refining ends with, within the memory that planes leave. */
