@@ -57,6 +57,10 @@ describe('a page', () => {
         expect(await until(() => model.complete)).toBe(true);
       }
       expect(rounds).toBe(2);
+      model.lacking = true; // what did not come is asked for again at its own time
+      model.frame({ ...defaultOrbit, thetaDegrees: defaultOrbit.thetaDegrees + 90 });
+      expect(await until(() => !model.complete, 0.8)).toBe(false);
+      expect(rounds).toBe(2);
     }));
   it('keeps within its memory', () =>
     withPage({ time: 2, memoryBytes: 1e6 }, async ({ page, canvas }) => {

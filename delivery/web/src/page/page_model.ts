@@ -132,9 +132,9 @@ export class PageModel {
     this.host_.redraw(this);
     this.host_.changed(this);
   }
-  /** The load follows the camera. A little later, what another view shows is fetched. */
+  /** The load follows the camera. Soon, what another view shows is fetched; not while a host fails. */
   look(): void {
-    if (this.load?.update(this.camera))
+    if (this.load?.update(this.camera) && !this.lacking)
       this.looking_ ??= setTimeout(() => {
         ++this.views_;
         this.askForRest_();
