@@ -65,3 +65,27 @@ export function proxyStep(m: Manifest, wanted: number, displayedPx: number,
   }
   return best;
 }
+
+/**
+ * The next proxy behind `shown` on the way to the largest one that comes in time and looks better than scales
+ * do then: a smaller one where both come in time and the mean FLIP in the time left falls by a twentieth at
+ * least. -1: none.
+ */
+export function proxyAhead(m: Manifest, shown: number, displayedPx: number, { bytesS, rttS, leftS }: StepLink,
+    scales: { flip: number; fits(proxy: number): boolean }): number {
+  const flips = m.proxies.map((_, k) => proxyLoss(m, k, displayedPx).flip);
+  const takesS = (k: number): number => rttS + proxyBytesBeyondStart(m, k) / bytesS;
+  let last = flips.length - 1;
+  while (last > shown && !(scales.fits(last) && takesS(last) < leftS && flips[last] < scales.flip)) --last;
+  if (last <= shown) return -1;
+  /** FLIP times seconds: `first` comes before the last one. */
+  const seen = (first: number, firstS: number): number => flips[shown] * firstS +
+    flips[first] * takesS(last) + flips[last] * (leftS - firstS - takesS(last));
+  let next = last;
+  let least = paying * seen(shown, 0);
+  for (let k = shown + 1; k < last; ++k) {
+    const now = seen(k, takesS(k));
+    if (takesS(k) + takesS(last) < leftS && scales.fits(k) && now < least) [least, next] = [now, k];
+  }
+  return next;
+}

@@ -2,8 +2,8 @@ import { type FragmentList, type ListOptions, lossesOf } from '../decide/fragmen
 import { scaleWithin } from '../decide/gpu_memory';
 import { proxyBytes, scaleBytes } from '../decide/gpu_size';
 import { clamp } from '../decide/numbers';
-import { proxyBytesBeyondStart, proxyLoss } from '../decide/proxy_choice';
-import { proxyStep } from '../decide/proxy_steps';
+import { proxyLoss } from '../decide/proxy_choice';
+import { proxyAhead, proxyStep } from '../decide/proxy_steps';
 import { throughputOf } from '../decide/request_groups';
 import { choiceInTime, refinedScale } from '../decide/scale_choice';
 import { type PlaneChoice, pictureFlip } from '../decide/texture_loss';
@@ -12,7 +12,7 @@ import { throwIfAborted } from '../format/errors';
 import { worthwhileFlip } from '../format/shared_numbers';
 import { nextTurn, nowS, sleepS } from '../http/requests';
 import type { PlaneComposer } from './composer';
-import { FetchInTime, composeS } from './fetch_in_time';
+import { FetchInTime, certain, composeS } from './fetch_in_time';
 import { FragmentFetch, allWishes, bestWishes, requestBytes } from './fragment_fetch';
 import type { LoadContext } from './load_context';
 import type { ScaleSource } from './scale_source';
@@ -41,17 +41,6 @@ export function stepOf(load: LoadContext): number {
   const step =
     proxyStep(manifest, wanted, heightPx, { bytesS: throughputBytesS(load), rttS: client.latencyS, leftS });
   return step >= 0 && fits(load, step) ? step : -1;
-}
-
-/** The largest proxy behind `shown` that comes in time and looks better than scales do then; -1: none. */
-function betterThanScales(load: LoadContext, shown: number, flip: number, leftS: number): number {
-  const { reader: { manifest, client }, view: { display: { heightPx } }, beta0 } = load;
-  const better = (k: number): boolean =>
-    fits(load, k) && client.latencyS + proxyBytesBeyondStart(manifest, k) / beta0 < leftS &&
-      proxyLoss(manifest, k, heightPx).flip < flip - worthwhileFlip;
-  let k = manifest.proxies.length - 1;
-  while (k > shown && !better(k)) --k;
-  return k > shown ? k : -1;
 }
 
 /** Bytes of all requests that are made at once while refining. */
@@ -128,24 +117,21 @@ export class TextureLoad {
 
   /** Scale and textures within the time. */
   async timedPart(): Promise<void> {
-    const { load_: load, planes_: planes, fetching_: fetching } = this;
-    const { reader, options, signal } = load;
+    const { load_: load, fetching_: fetching } = this;
+    const { reader, options } = load;
     load.beta0 = throughputBytesS(load);
     if (options.policy === 'thesis') this.inTime_.printed = await import('../decide/thesis_list');
     if (options.jnd !== undefined)
       this.alike_ = await (await import('../decide/thesis_list')).coarsestAlike(load);
     const { scale, planes: chosen, flip } = await this.choice_();
-    if (flip !== undefined) await this.showBetterProxy_(flip);
+    // Behind a proxy that looks better than scales do in the time, the rest is refining.
+    if (flip !== undefined && (await this.showBetterProxies_(flip))) return this.endTimed_();
     if (scale !== this.scale_.shown) load.enter('mesh');
     const meshBytes = this.source_.bytesOf(scale);
     const mesh = this.scale_.load(scale);
     // Picture and fragments stand without the mesh, too.
     const meshShown = mesh.shown.catch((error: unknown) => this.scale_.lost(error, scale));
-    // Coverage that no material asks for is not fetched.
-    const choices = planes.fitting(chosen, scale)
-      .filter(({ base }) => planes.textures[base].role !== 'alpha' || planes.isUsed(base));
-    const [{ shown }] = await Promise.all([planes.show(choices),
-      fetching.transfers.prepare(choices.map((c) => c.plane), signal)]);
+    const { shown } = await this.showPlanes_(chosen, scale);
     this.list_ = await fetching.listOf(scale, unseen, this.scale_.surface());
     // A mesh that takes less than a round trip leaves the link to the textures. A longer one is waited for;
     // coarser scales show on its way.
@@ -157,18 +143,42 @@ export class TextureLoad {
     await fetching.composed();
     // refining asks for them, too
     await this.useRest_().catch((error: unknown) => load.fail(error, 'finer planes'));
-    throwIfAborted(signal);
+    throwIfAborted(load.signal);
     const skipped = this.skippedFragments_();
     await Promise.race([meshShown, this.timer_(1)]);
     this.releaseIfBetter_();
+    this.endTimed_(skipped);
+  }
+  private endTimed_(skipped = 0): void {
+    const { load_: load } = this;
     load.emit('deadline', { limit: load.limitS, actual: load.elapsedS(), skipped });
   }
-  /** Shows a larger proxy first where scales look worse in the time. */
-  private async showBetterProxy_(flip: number): Promise<void> {
-    const { scale_: { proxy, held }, load_: load } = this;
-    const better = held ? betterThanScales(load, proxy.shown, flip, this.inTime_.leftS()) : -1;
-    // the smaller one stays
-    if (better >= 0) await proxy.show(better).catch((error: unknown) => load.fail(error, 'proxy'));
+  /** Shows larger proxies where scales look worse in the time. False: what is shown is no better. */
+  private async showBetterProxies_(flip: number): Promise<boolean> {
+    const { scale_: { proxy, held }, load_: load, inTime_: inTime } = this;
+    const { beta0, reader: { manifest, client }, view: { display: { heightPx } } } = load;
+    const better = { flip: flip - worthwhileFlip, fits: (k: number): boolean => fits(load, k) };
+    // A link that slows down a little makes none late.
+    const link = { bytesS: certain * beta0, rttS: client.latencyS };
+    const next = (): number =>
+      proxyAhead(manifest, proxy.shown, heightPx, { ...link, leftS: inTime.leftS() }, better);
+    try {
+      for (let k; held && (k = next()) >= 0; ) await proxy.show(k);
+    } catch (error) {
+      load.fail(error, 'proxy'); // the smaller one stays
+    }
+    return held && proxyLoss(manifest, proxy.shown, heightPx).flip < better.flip;
+  }
+  /** Shows the previews of these planes beside a scale. The second promise is that the scene has changed. */
+  private async showPlanes_(chosen: readonly PlaneChoice[],
+      scale: number): Promise<{ shown: Promise<unknown> }> {
+    const { planes_: planes, fetching_: fetching, load_: { signal } } = this;
+    // Coverage that no material asks for is not fetched.
+    const choices = planes.fitting(chosen, scale)
+      .filter(({ base }) => planes.textures[base].role !== 'alpha' || planes.isUsed(base));
+    const [showing] = await Promise.all([planes.show(choices),
+      fetching.transfers.prepare(choices.map((c) => c.plane), signal)]);
+    return showing;
   }
   /** The scale takes the proxy's place once the scale is predicted to look better. */
   private releaseIfBetter_(): void {
@@ -273,7 +283,10 @@ export class TextureLoad {
 
   /** Fetches what camera and display can show, until nothing is left or somebody asks for another turn. */
   async refine(again: () => boolean): Promise<void> {
+    const { planes_: planes, scale_: { wanted } } = this;
     this.fetching_.fates.allowLostAgain();
+    // Behind a proxy that took the whole time.
+    if (planes.all().length === 0) await (await this.showPlanes_(planes.forDisplay(), wanted)).shown;
     await this.showFinerPlanes_();
     while (!again() && (await this.refineSome_()));
     if (!again()) await this.fetching_.composed();

@@ -1,5 +1,7 @@
 import { describe, expect, it } from 'vitest';
 import { type DeliveryPlan, defaultDeliveryRequest, planDelivery } from '../../src/decide/delivery_plan';
+import { proxyAhead } from '../../src/decide/proxy_steps';
+import type { Manifest } from '../../src/format/manifest';
 import type { PackageData } from '../../src/format/tables';
 import { setUp } from '../support/transferring';
 
@@ -57,5 +59,28 @@ describe('a larger proxy on the way', () => {
     const without = planDelivery({ ...data, manifest: one } as PackageData, ask)!;
     expect(without.step).toBeUndefined();
     expect(plan.meshS).toBeCloseTo(without.meshS + 0.04 + 0.5, 6);
+  });
+});
+
+describe('proxies ahead of scales', () => {
+  const glb = (bytes: number) => ({ path: '', offset: 1e5, bytes, sha256: new Uint8Array(32) });
+  const proxy = (bytes: number, flip: number) => ({ glb: glb(bytes),
+    triangles: 1, vertices: 3, texturePx: 0, flip: [flip], flipP95: [1] });
+  const manifest = { proxySizesPx: [512], proxies: [proxy(36e3, 0.18), proxy(50e3, 0.14), proxy(150e3, 0.08),
+    proxy(250e3, 0.065), proxy(450e3, 0.04)] } as unknown as Manifest;
+  const next = (shown: number, leftS: number, flip: number, fits = (_: number) => true): number =>
+    proxyAhead(manifest, shown, 512, { bytesS: 250e3, rttS: 0.04, leftS }, { flip, fits });
+  it('the largest comes last, behind one that shortens the wait where both come in time', () => {
+    expect(next(0, 3.5, 0.05)).toBe(2); // .64 s and 1.84 s
+    expect(next(2, 2.86, 0.05)).toBe(4);
+    expect(next(0, 2.3, 0.05)).toBe(1); // only the smallest leaves time for the last one
+    expect(next(0, 1.9, 0.05)).toBe(4);
+    expect(next(4, 9, 0.05)).toBe(-1);
+  });
+  it('none comes where scales look better, and none that has no room', () => {
+    expect(next(0, 3.5, 0.04)).toBe(-1);
+    expect(next(0, 1.8, 0.05)).toBe(-1); // the only one that looks better would be late
+    expect(next(0, 3.5, 0.07, (k) => k < 4)).toBe(2);
+    expect(next(2, 3.5, 0.07, (k) => k < 4)).toBe(3);
   });
 });
