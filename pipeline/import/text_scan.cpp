@@ -152,8 +152,13 @@ std::string quote(std::string_view s) {
 
 void add_once(Notes& notes, Severity severity, const char* code, const std::string& place,
               const std::string& text) {
-  const auto same = [&](const Note& n) { return n.code == code && n.text == text; };
-  if (std::none_of(notes.begin(), notes.end(), same)) notes.push_back({severity, code, place, text});
+  std::size_t of_code = 0;
+  for (const Note& n : notes) {
+    if (n.code != code) continue;
+    if (n.text == text || ++of_code > kMostNotesOfCode) return;
+  }
+  const bool is_last = of_code == kMostNotesOfCode;
+  notes.push_back({severity, code, place, is_last ? "there are more of these, which are left out" : text});
 }
 
 }  // namespace texmesh

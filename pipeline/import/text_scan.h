@@ -70,7 +70,10 @@ class LineReader {
 /// A text shortened for a message, with control characters replaced.
 std::string quote(std::string_view s);
 
-/// Adds a note, unless one of this code says the same already.
+/// Nobody reads more notes of one kind, and each is compared with all others.
+inline constexpr std::size_t kMostNotesOfCode = 1000;
+/// Adds a note, unless one of this code says the same already. Behind kMostNotesOfCode one says that there
+/// are more.
 void add_once(Notes& notes, Severity severity, const char* code, const std::string& place,
               const std::string& text);
 

@@ -4,8 +4,6 @@
 #include <linux/openat2.h>
 #include <sys/syscall.h>
 
-#include "pipeline/io/names/similar_names.h"
-
 namespace texmesh {
 namespace {
 
@@ -245,7 +243,7 @@ std::optional<Bytes> FileResolver::read_beside(const std::string& name, std::uin
 }
 
 std::vector<std::string> FileResolver::similar(const std::string& uri) {
-  SimilarNames found = similar_names(roots_[0], uri);
+  SimilarNames found = similar_names(roots_[0], uri, lists_);
   if (asked_similar_.insert(uri).second) requests_.push_back(found.request(uri));
   return std::move(found.names);
 }

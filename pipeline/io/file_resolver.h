@@ -2,7 +2,7 @@
 #include <filesystem>
 #include <set>
 
-#include "pipeline/io/file_stamp.h"
+#include "pipeline/io/names/similar_names.h"
 #include "pipeline/io/resolver.h"
 
 namespace texmesh {
@@ -57,6 +57,7 @@ class FileResolver : public Resolver {
   std::vector<FileRequest> requests_;
   std::map<std::string, std::size_t> index_of_;  // of files
   std::set<std::string> asked_similar_;
+  FolderLists lists_;
   std::map<std::string, FileRequest> expected_;
 };
 

@@ -39,9 +39,10 @@ bool same_folder(std::string path, std::int64_t looked_at_ns, const FileStamp& k
 }
 
 /// As many names like that of `f` are beneath the folder as there were, and the same.
-bool same_names(const std::string& folder, std::int64_t looked_at_ns, FileRequest& f, bool& refreshed) {
+bool same_names(const std::string& folder, std::int64_t looked_at_ns, FileRequest& f, bool& refreshed,
+                FolderLists& lists) {
   if (f.stamp != FileStamp{} && same_folder(folder + f.uri, looked_at_ns, f.stamp)) return true;
-  const FileRequest now = similar_names(folder, f.uri).request(f.uri);
+  const FileRequest now = similar_names(folder, f.uri, lists).request(f.uri);
   if (now.digest != f.digest || now.bytes != f.bytes) return false;
   f.stamp = now.stamp;
   refreshed = true;
@@ -125,9 +126,10 @@ bool still_holds(PackageMemo& memo, const std::string& input, const std::string&
   const std::int64_t now_ns = wall_clock_ns();
   const std::string_view folder = std::string_view(input).substr(0, input.rfind('/') + 1);
   if (std::string_view(input).substr(folder.size()) != memo.input_name) return false;
+  FolderLists lists;
   for (FileRequest& f : memo.files) {
     const std::string path = f.uri.empty() ? input : std::string(folder) + f.uri;
-    const bool same = f.similar ? same_names(std::string(folder), memo.looked_at_ns, f, refreshed)
+    const bool same = f.similar ? same_names(std::string(folder), memo.looked_at_ns, f, refreshed, lists)
                       : f.found ? same_file(path, memo.looked_at_ns, f.digest, f.bytes, f.stamp, refreshed)
                                 : !stamp_of(path);
     if (!same) return false;

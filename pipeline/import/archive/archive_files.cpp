@@ -159,6 +159,7 @@ Bytes inflated(Bytes packed, std::uint64_t bytes) {
   return out;
 }
 
+constexpr std::size_t kMostSimilar = 16;  // in each of the two ways in which names are alike
 constexpr std::uint64_t kMaxTextBytes = 65'536;
 
 /// The file of at most so many bytes that is least deep of those whose last part, in small letters, is
@@ -290,6 +291,13 @@ ArchiveFiles::ArchiveFiles(std::unique_ptr<ByteSource> source, std::uint64_t max
   files_ = list_archive(*source_, max_bytes);
   if (const auto k = model_of_archive(files_, archive_)) model_ = files_[*k].name;
   folder_ = model_.substr(0, model_.rfind('/') + 1);
+  for (std::size_t i = 0; i < files_.size(); ++i) {
+    const std::string last = archived_name(files_[i].name);
+    by_name_.emplace(files_[i].name, i);
+    by_last_[last].push_back(i);
+    by_last_key_[similar_key(last)].push_back(i);
+    if (const std::string key = key_below(files_[i]); !key.empty()) by_key_[key].push_back(i);
+  }
 }
 
 Bytes ArchiveFiles::unpacked(const ArchivedFile& file, std::uint64_t max_bytes) {
@@ -320,30 +328,31 @@ Bytes ArchiveFiles::unpacked(const ArchivedFile& file, std::uint64_t max_bytes) 
 
 std::optional<Bytes> ArchiveFiles::read(const std::string& uri, std::uint64_t max_bytes) {
   for (const std::string& whole : {folder_ + uri, uri})
-    if (const auto exact = std::ranges::find(files_, whole, &ArchivedFile::name); exact != files_.end())
-      return unpacked(*exact, max_bytes);
-  const ArchivedFile* only = nullptr;
-  for (const ArchivedFile& f : files_) {
-    if (archived_name(f.name) != archived_name(uri)) continue;
-    if (only) return std::nullopt;
-    only = &f;
-  }
-  return only ? std::optional(unpacked(*only, max_bytes)) : std::nullopt;
+    if (const auto exact = by_name_.find(whole); exact != by_name_.end())
+      return unpacked(files_[exact->second], max_bytes);
+  const auto only = by_last_.find(archived_name(uri));
+  if (only == by_last_.end() || only->second.size() > 1) return std::nullopt;
+  return unpacked(files_[only->second[0]], max_bytes);
+}
+
+std::string ArchiveFiles::key_below(const ArchivedFile& f) const {
+  return f.name.starts_with(folder_) ? similar_key(f.name.substr(folder_.size())) : "";
 }
 
 std::vector<std::string> ArchiveFiles::similar(const std::string& uri) {
   std::vector<std::string> out;
-  const std::string key = similar_key(uri), key_of_last = similar_key(archived_name(uri));
-  const auto is_named_once = [this](const std::string& last) {
-    return std::ranges::count(files_, last, [](const ArchivedFile& f) { return archived_name(f.name); }) == 1;
-  };
-  for (const ArchivedFile& f : files_) {
-    const bool is_below = f.name.starts_with(folder_) && f.name != folder_ + uri;
-    if (is_below && similar_key(f.name.substr(folder_.size())) == key)
-      out.push_back(f.name.substr(folder_.size()));
-    else if (const std::string last = archived_name(f.name); similar_key(last) == key_of_last)
-      out.push_back(is_named_once(last) ? last : f.name);
-  }
+  const std::string key = similar_key(uri), asked = folder_ + uri;
+  const auto is_of_key = [&](const ArchivedFile& f) { return f.name != asked && key_below(f) == key; };
+  if (const auto below = by_key_.find(key); below != by_key_.end())
+    for (std::size_t i = 0; i < below->second.size() && out.size() < kMostSimilar; ++i)
+      if (const ArchivedFile& f = files_[below->second[i]]; is_of_key(f))
+        out.push_back(f.name.substr(folder_.size()));
+  if (const auto named = by_last_key_.find(similar_key(archived_name(uri))); named != by_last_key_.end())
+    for (std::size_t i = 0; i < named->second.size() && out.size() < 2 * kMostSimilar; ++i) {
+      const ArchivedFile& f = files_[named->second[i]];
+      const std::string last = archived_name(f.name);
+      if (!is_of_key(f)) out.push_back(by_last_[last].size() == 1 ? last : f.name);
+    }
   std::ranges::sort(out);
   out.erase(std::unique(out.begin(), out.end()), out.end());  // clang 14, which fuzzes, has no ranges::unique
   return out;

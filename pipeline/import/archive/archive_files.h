@@ -1,5 +1,7 @@
 #pragma once
 
+#include <unordered_map>
+
 #include "format/base/note.h"
 #include "format/container/container.h"
 #include "format/documents/about.h"
@@ -52,9 +54,16 @@ class ArchiveFiles : public Resolver {
   std::vector<std::string> similar(const std::string& uri) override;
 
  private:
+  /// similar_key() of the name from the model's folder; "" for a file elsewhere.
+  std::string key_below(const ArchivedFile& file) const;
   std::string archive_, model_, folder_;
   std::unique_ptr<ByteSource> source_;
   std::vector<ArchivedFile> files_;
+  // Numbers of files by whole name, by last part, by similar_key() from the model's folder and of the last
+  // part: a model may name as many files as there are.
+  using Numbers = std::unordered_map<std::string, std::vector<std::size_t>>;
+  std::unordered_map<std::string, std::size_t> by_name_;
+  Numbers by_last_, by_key_, by_last_key_;
 };
 
 /// What an archive says of its model beside it: Sketchfab's license.txt (title, author, source, licence,

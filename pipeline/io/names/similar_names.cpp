@@ -13,10 +13,12 @@ namespace {
 
 /// Bounds for a folder that somebody made to take time.
 constexpr std::size_t kMostEntries = 1'000'000, kMostSimilar = 16;
+constexpr int kListedFolder = O_RDONLY | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC;
 
 /// Walks down from one folder. Depth is bounded by the parts of a name, width by kMostSimilar.
 class Search {
  public:
+  explicit Search(FolderLists& lists) : lists_(lists) {}
   void look(int folder, const std::string& before, std::string_view rest) {
     const std::size_t slash = rest.find('/');
     const std::string part(rest.substr(0, slash));
@@ -25,7 +27,7 @@ class Search {
       return;
     }
     const auto go_on = [&](const std::string& entry) {
-      const Descriptor next(::openat(folder, entry.c_str(), kFolder));
+      const Descriptor next(::openat(folder, entry.c_str(), kListedFolder));
       if (next.get() >= 0) look(next.get(), before + entry + "/", rest.substr(slash + 1));
       return next.get() >= 0;
     };
@@ -40,37 +42,50 @@ class Search {
     std::sort(found_.names.begin(), found_.names.end());
     return std::move(found_);
   }
-  static constexpr int kFolder = O_RDONLY | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC;
 
  private:
   void add(std::string name) {
     if (found_.names.size() < kMostSimilar) found_.names.push_back(std::move(name));
   }
-  /// Entries of the same key, without `part` itself.
   std::vector<std::string> entries_like(int folder, const std::string& part) {
-    std::vector<std::string> like;
-    struct stat s {};
-    Descriptor own(::openat(folder, ".", kFolder));
-    if (own.get() < 0 || ::fstat(own.get(), &s) != 0) return like;
-    found_.folder = listed_++ == 0 ? stamp_of(s) : FileStamp{};
-    const std::string key = similar_key(part);
-    const std::unique_ptr<DIR, int (*)(DIR*)> listing(::fdopendir(own.get()), ::closedir);
-    if (!listing) return like;
-    own.release();
-    for (std::size_t n = 0; n < kMostEntries; ++n) {
-      const dirent* entry = ::readdir(listing.get());
-      if (entry == nullptr) break;
-      if (entry->d_name != part && similar_key(entry->d_name) == key) like.emplace_back(entry->d_name);
-    }
-    std::sort(like.begin(), like.end());
-    if (like.size() > kMostSimilar) like.resize(kMostSimilar);
+    FileStamp stamp;
+    std::vector<std::string> like = lists_.entries_like(folder, part, stamp);
+    if (stamp != FileStamp{}) found_.folder = listed_++ == 0 ? stamp : FileStamp{};
     return like;
   }
+  FolderLists& lists_;
   SimilarNames found_;
   int listed_ = 0;
 };
 
 }  // namespace
+
+std::vector<std::string> FolderLists::entries_like(int folder, const std::string& part, FileStamp& stamp) {
+  struct stat s {};
+  Descriptor own(::openat(folder, ".", kListedFolder));
+  if (own.get() < 0 || ::fstat(own.get(), &s) != 0) return {};
+  stamp = stamp_of(s);
+  if (entries_ > kMostEntries) lists_.clear(), entries_ = 0;
+  List& list = lists_[{s.st_dev, s.st_ino}];
+  if (list.stamp != stamp) {
+    list = {stamp, {}};
+    const std::unique_ptr<DIR, int (*)(DIR*)> listing(::fdopendir(own.get()), ::closedir);
+    if (!listing) return {};
+    own.release();
+    for (std::size_t n = 0; n < kMostEntries; ++n, ++entries_) {
+      const dirent* entry = ::readdir(listing.get());
+      if (entry == nullptr) break;
+      list.by_key[similar_key(entry->d_name)].emplace_back(entry->d_name);
+    }
+    for (auto& [key, names] : list.by_key) std::sort(names.begin(), names.end());
+  }
+  const auto found = list.by_key.find(similar_key(part));
+  if (found == list.by_key.end()) return {};
+  std::vector<std::string> like;
+  for (const std::string& name : found->second)
+    if (name != part && like.size() < kMostSimilar) like.push_back(name);
+  return like;
+}
 
 FileRequest SimilarNames::request(const std::string& name) const {
   std::string list;
@@ -78,8 +93,8 @@ FileRequest SimilarNames::request(const std::string& name) const {
   return {name, !names.empty(), sha256(text_bytes(list)), names.size(), folder, true};
 }
 
-SimilarNames similar_names(const std::string& folder, const std::string& name) {
-  Search search;
+SimilarNames similar_names(const std::string& folder, const std::string& name, FolderLists& lists) {
+  Search search(lists);
   const Descriptor top(::open(folder.empty() ? "." : folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
   if (top.get() >= 0) search.look(top.get(), "", name);
   return search.take();

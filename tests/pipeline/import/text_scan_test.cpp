@@ -30,4 +30,15 @@ TEST(TextScan, Numbers) {
     EXPECT_FALSE(parse_number(text, x)) << text;
 }
 
+TEST(TextScan, NotesOfOneKindEnd) {
+  Notes notes;
+  for (int repeat = 0; repeat < 2; ++repeat)
+    for (std::size_t i = 0; i < 2 * kMostNotesOfCode; ++i)
+      add_once(notes, Severity::kWarning, "missing-texture", "", std::to_string(i));
+  add_once(notes, Severity::kWarning, "other", "", "0");
+  ASSERT_EQ(notes.size(), kMostNotesOfCode + 2);
+  EXPECT_EQ(notes[kMostNotesOfCode - 1].text, std::to_string(kMostNotesOfCode - 1));
+  EXPECT_EQ(notes[kMostNotesOfCode].text, "there are more of these, which are left out");
+}
+
 }  // namespace texmesh::text_scan_test

@@ -1,10 +1,13 @@
 // Archives as services give them, and hostile ones: a sentence each.
 #include <gtest/gtest.h>
 
+#include <chrono>
+
 #include "pipeline/import/archive/archive_files.h"
 #include "pipeline/import/import.h"
 #include "pipeline/io/file_resolver.h"
 #include "tests/support/images.h"
+#include "tests/support/sanitizers.h"
 #include "tests/support/zip_writer.h"
 
 namespace texmesh::archive_test {
@@ -91,6 +94,22 @@ TEST(Archive, OfTwoPicturesOfOneNameNeitherIsTakenAndBothAreTold) {
   ASSERT_NE(told, unknown.notes.end());
   EXPECT_TRUE(has(told->text, R"(any of these may be meant: "b/C.png", "c/C.png")")) << told->text;
   EXPECT_EQ(of("b/C.png").images.size(), 1u) << "a whole name of the archive";
+}
+
+TEST(Archive, ThousandsOfNamesAmongThousandsOfFilesTakeNoTime) {
+  std::vector<ZipFile> files{{"a.obj", kObj}, {"m.mtl", "newmtl m\nmap_Kd x.png\n"}};
+  for (int i = 0; i < 2000; ++i) {
+    files[1].text += "newmtl m" + std::to_string(i) + "\nmap_Kd P" + std::to_string(i) + ".png\n";
+    files.push_back({"t" + std::to_string(i) + "/X.png", "x"});
+  }
+  const auto start = std::chrono::steady_clock::now();
+  const Model model = import_zip(files).model;
+  const std::chrono::duration<double> took = std::chrono::steady_clock::now() - start;
+  EXPECT_LT(took.count(), testing::sanitizers_take(3.0));
+  const auto told = std::ranges::find(model.notes, "missing-texture", &Note::code);
+  ASSERT_NE(told, model.notes.end());
+  EXPECT_TRUE(has(told->text, R"("x.png" not found)") && has(told->text, R"("t10/X.png", )")) << told->text;
+  EXPECT_LT(told->text.size(), 600u) << "not all 2,000";
 }
 
 TEST(Archive, WhatAnArchiveHasInThePlaceOfAModelIsTold) {

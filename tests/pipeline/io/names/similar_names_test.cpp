@@ -3,8 +3,12 @@
 
 #include <gtest/gtest.h>
 
+#include <chrono>
+#include <thread>
+
 #include "pipeline/io/uri.h"
 #include "tests/support/command.h"
+#include "tests/support/sanitizers.h"
 
 namespace texmesh::similar_names_test {
 
@@ -53,6 +57,23 @@ TEST(SimilarNames, ListsOnlyWhereAPartIsNotThere) {
   EXPECT_EQ(similar("tex/a.png").folder, FileStamp{}) << "it hangs on two folders";
   EXPECT_EQ(similar("c.JPG").request("c.JPG").bytes, 1u);
   EXPECT_EQ(similar_names(folder / "none", "a").names, Names{});
+}
+
+TEST(SimilarNames, AFolderIsListedAgainOnlyWhenItHasChanged) {
+  const testing::TemporaryFolder folder;
+  constexpr int kFiles = 4000;
+  for (int i = 0; i < kFiles; ++i) testing::write_text(folder / ("b" + std::to_string(i)), "");
+  FolderLists lists;
+  const auto similar = [&](const std::string& name) {
+    return similar_names(folder.path().string(), name, lists).names;
+  };
+  const auto start = std::chrono::steady_clock::now();
+  for (int i = 0; i < kFiles; ++i) EXPECT_EQ(similar("a" + std::to_string(i)).size(), 0u);
+  const std::chrono::duration<double> took = std::chrono::steady_clock::now() - start;
+  EXPECT_LT(took.count(), testing::sanitizers_take(3.0)) << "it lists the folder for each name";
+  std::this_thread::sleep_for(std::chrono::milliseconds(20));  // more than a tick of the file system's clock
+  testing::write_text(folder / "A7", "");
+  EXPECT_EQ(similar("a7"), std::vector<std::string>{"A7"});
 }
 
 }  // namespace texmesh::similar_names_test
