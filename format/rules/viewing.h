@@ -38,7 +38,7 @@ std::vector<ManifestStep> step_function(std::span<const ManifestScale> scales, S
 /// The scale of the first step that reaches this height.
 int scale_at(std::span<const ManifestStep> steps, double displayed_px);
 /// Square pixels that a triangle must have on average to show, of the square of the displayed height.
-inline constexpr double kLeastTrianglePx2 = 1;
+inline constexpr double kLeastTrianglePx2 = 0.5;
 /// The finest scale whose triangles show at a displayed height, whatever the step function calls enough;
 /// the coarsest where those of none do.
 int finest_shown(std::span<const ManifestScale> scales, double displayed_px);

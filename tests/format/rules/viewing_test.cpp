@@ -107,11 +107,11 @@ TEST(Viewing, ScaleAtAHeight) {
   EXPECT_EQ(scale_at(steps, 1e12), 0);
 }
 
-TEST(Viewing, ScalesShowAsLongAsTheirTrianglesHaveAPixel) {
+TEST(Viewing, ScalesShowAsLongAsTheirTrianglesHaveHalfAPixel) {
   const Manifest m = make_manifest();  // 160,000, 10,000, 625 and 39 triangles
-  EXPECT_EQ(finest_shown(m.scales, 400), 0);
-  EXPECT_EQ(finest_shown(m.scales, 399), 3);
-  EXPECT_EQ(finest_shown(m.scales, 25), 7);
+  EXPECT_EQ(finest_shown(m.scales, 283), 0);
+  EXPECT_EQ(finest_shown(m.scales, 282), 3);
+  EXPECT_EQ(finest_shown(m.scales, 18), 7);
   EXPECT_EQ(finest_shown(m.scales, 1), 9) << "the coarsest, where those of none show";
 }
 

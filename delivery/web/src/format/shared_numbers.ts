@@ -140,7 +140,7 @@ export const fewerBytes = 0.7;
 export const finerPays = 0.9;
 export const finerLeaves = 0.5;
 /** Square pixels that a triangle must have on average to show, of the square of the displayed height. */
-export const leastTrianglePx2 = 1;
+export const leastTrianglePx2 = 0.5;
 /** Quality of lists as printed, at most. */
 export const highestPrinted = 97;
 export const leastRequestS = 0.006; // a request is worth at least so much of the link
