@@ -223,7 +223,7 @@ std::optional<ProxyParts> ProxyParts::read(std::span<const std::uint8_t> glb, co
     return std::nullopt;
   out.meshes_ = thinner_meshes(model.mesh, context);
   for (const char* list : {"bufferViews", "accessors", "meshes", "buffers"}) chunks.root.erase(list);
-  out.json_ = chunks.root.dump();
+  out.root_ = std::move(chunks.root);
   return out;
 }
 
@@ -235,7 +235,7 @@ const ProxyMap* ProxyParts::map_of(ProxyMap::Use use) const {
 double ProxyParts::extent() const { return longest_side(meshes_.front()); }
 
 Json ProxyParts::materials_of(const ProxyMapChoice& choice) const {
-  Json root = Json::parse(json_);
+  Json root = root_;
   const ProxyMap* data = map_of(Use::kData);
   for (Json& material : root["materials"]) {
     if (!choice.data && slot_of(material, kSlots[1])) use_means(material, data->pixels);
