@@ -3,7 +3,6 @@
 
 #include "delivery/cpp/decide/fragment_list.h"
 #include "format/rules/viewing.h"
-#include "pipeline/about/gltf_about.h"
 #include "pipeline/io/table.h"
 #include "tools/extract/budget/budget_search.h"
 #include "tools/extract/proxy/proxy_search.h"

@@ -2,7 +2,6 @@
 
 #include "format/base/portable_math.h"
 #include "format/rules/proxy_choice.h"
-#include "pipeline/about/gltf_about.h"
 #include "pipeline/io/file_resolver.h"
 #include "stages/base/float_math.h"
 #include "stages/condition/condition.h"
