@@ -67,11 +67,15 @@ void document_members(auto& v, auto& all) {
 
 }  // namespace
 
-std::string write_annotations(const Annotations& annotations) {
+nlohmann::ordered_json annotations_json(const Annotations& annotations) {
   nlohmann::ordered_json json;
   MemberWriter to(json);
   document_members(to, annotations);
-  std::string text = dump_json(json, kAnnotationsPath);
+  return json;
+}
+
+std::string write_annotations(const Annotations& annotations) {
+  std::string text = dump_json(annotations_json(annotations), kAnnotationsPath);
   read_annotations(text_bytes(text), kAnnotationsPath);
   return text;
 }

@@ -1,4 +1,5 @@
 #pragma once
+#include <nlohmann/json_fwd.hpp>
 #include <optional>
 
 #include "format/base/fields.h"
@@ -60,6 +61,8 @@ struct Annotations {
 /// Canonical JSON: fixed order of names, no blanks; what is missing is left out. FormatError when a value
 /// breaks a rule that read_annotations checks.
 std::string write_annotations(const Annotations& annotations);
+/// The same document, unchecked.
+nlohmann::ordered_json annotations_json(const Annotations& annotations);
 /// Strict for what this version defines, ignores unknown members. FormatError names the JSON pointer. `file`
 /// is what it calls the document.
 Annotations read_annotations(std::span<const std::uint8_t> json, const std::string& file);

@@ -1,7 +1,5 @@
 #include "format/model/material_extensions.h"
 
-#include "format/model/model.h"
-
 namespace texmesh {
 namespace {
 

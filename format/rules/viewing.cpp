@@ -111,31 +111,6 @@ int finest_shown(std::span<const ManifestScale> scales, double displayed_px) {
   return scales.empty() ? 0 : scales.back().scale;
 }
 
-PixelError pixel_error(const Manifest& manifest, const ManifestScale& scale, double displayed_px) {
-  if (scale.scale == 0 || !(manifest.object_height > 0)) return {};
-  const double px_per_unit = displayed_px / manifest.object_height;
-  const double p95 = scale.display_px_error >= kAnyDisplayPx ? 0 : displayed_px / scale.display_px_error;
-  return {p95, scale.error_rms * px_per_unit, std::max(p95, scale.error_max * px_per_unit)};
-}
-
-VisiblePart clip_to(const ScreenRect& object, const ScreenRect& view) {
-  const double x0 = std::max(object.x0, view.x0), x1 = std::min(object.x1, view.x1);
-  const double y0 = std::max(object.y0, view.y0), y1 = std::min(object.y1, view.y1);
-  if (!(x1 > x0) || !(y1 > y0)) return {0, 0, true};
-  const bool whole = x0 <= object.x0 && x1 >= object.x1 && y0 <= object.y0 && y1 >= object.y1;
-  return {x1 - x0, y1 - y0, !whole};
-}
-
-VisiblePart clip_to(const ScreenRect& object, const ScreenCircle& fovea) {
-  return clip_to(object, ScreenRect{fovea.x - fovea.radius, fovea.y - fovea.radius, fovea.x + fovea.radius,
-                                    fovea.y + fovea.radius});
-}
-
-double fovea_radius_px(double eye_distance_px, double degrees) {
-  require_viewing(degrees > 0 && degrees < 180, "angle of the fovea", "0 .. 180 degrees", degrees);
-  return eye_distance_px * half_tangent(degrees);
-}
-
 int select_scale(const Manifest& manifest, double displayed_px, const VisiblePart& part, StepRule rule) {
   const std::span<const ManifestScale> scales = manifest.scales;
   if (!part.clipped) return scale_at(step_function(scales, rule), displayed_px);

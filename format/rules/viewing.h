@@ -43,37 +43,11 @@ inline constexpr double kLeastTrianglePx2 = 0.5;
 /// the coarsest where those of none do.
 int finest_shown(std::span<const ManifestScale> scales, double displayed_px);
 
-/// How far a scale's surface is from S_0's on screen, in px at most (a distance seen from the side). `max` is
-/// the largest of some thousand sampled distances, never less than p95, which comes from samples of its own.
-/// What has vanished counts with its distance to what is left.
-struct PixelError {
-  double p95 = 0, rms = 0, max = 0;
-};
-PixelError pixel_error(const Manifest& manifest, const ManifestScale& scale, double displayed_px);
-
-/// Rectangles and circles on the screen, in px.
-struct ScreenRect {
-  double x0 = 0, y0 = 0, x1 = 0, y1 = 0;
-};
-struct ScreenCircle {
-  double x = 0, y = 0, radius = 0;
-};
 /// The shape that the visible part of an object makes (thesis 7.2, Fig. 7.5).
 struct VisiblePart {
   double width_px = 0, height_px = 0;  // both 0: nothing of the object is to be seen
   bool clipped = false;                // false: all of it
 };
-/// `object` bounds the object on the screen. Fig. 7.5, left: the border of the display (or window) cuts it.
-VisiblePart clip_to(const ScreenRect& object, const ScreenRect& view);
-/// Fig. 7.5, right: only what the fovea covers counts. The part is the object's bounds cut by the square
-/// around the circle.
-VisiblePart clip_to(const ScreenRect& object, const ScreenCircle& fovea);
-
-/// Angle of the region that the thesis takes for what the fovea covers, though the fovea proper is about 1
-/// degree wide: all of an object on its 12 inch high monitors at 30 inches.
-inline constexpr double kFoveaDegrees = 23;
-/// Radius on screen of a cone of that angle, for an eye `eye_distance_px` in front of the screen.
-double fovea_radius_px(double eye_distance_px, double degrees = kFoveaDegrees);
 
 /// The scale for an object displayed `displayed_px` high (the whole of it, seen or not) of which only a part
 /// is visible. The part is a shape of its own: no point of it is farther from its skeleton than half its

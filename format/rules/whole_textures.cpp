@@ -1,7 +1,6 @@
 #include "format/rules/whole_textures.h"
 
 #include <map>
-#include <numeric>
 
 #include "format/rules/allocation.h"
 #include "format/rules/picture_prediction.h"

@@ -1,8 +1,6 @@
 #include "lab/study/allocation_study.h"
 
 #include <algorithm>
-#include <array>
-#include <cmath>
 
 #include "format/base/vec.h"
 #include "format/rules/allocation.h"

@@ -352,6 +352,12 @@ constexpr Monitor kMonitors[] = {
     {16, 12, 1280, 1024}, {11, 8, 1024, 768}, {12, 9, 1024, 768}, {14, 11, 1280, 1024}};
 constexpr double kNear_in = 18, kFar_in = 30;
 
+/// Of a screen that an eye looks at from so far.
+double px_per_degree(double distance_px) {
+  const double half = portable::kPi / 360;
+  return 2 * distance_px * portable::sin(half) / portable::cos(half);
+}
+
 std::vector<ManifestScale> viewed_scales(const Nutcracker& n) {
   std::vector<ManifestScale> out;
   for (std::size_t k = 0; k < n.chain.scales.scales.size(); ++k) {
@@ -387,9 +393,8 @@ Exhibit table_7_3(const Nutcracker& n) {
     coarser += by_jnd > pixel;
     table.rows.push_back({fmt::format("{}", k + 1), fmt::format("{:.0f} x {:.0f}", m.width_in, m.height_in),
                           fmt::format("{:.0f} x {:.0f}", m.width_px, m.height_px), per_inch,
-                          fovea_radius_px(kNear_in * per_inch, 1) * 2,
-                          fovea_radius_px(kFar_in * per_inch, 1) * 2, kThesisJnd * middle * m.height_px,
-                          by_jnd, pixel, scale_at(by_edge, m.height_px)});
+                          px_per_degree(kNear_in * per_inch), px_per_degree(kFar_in * per_inch),
+                          kThesisJnd * middle * m.height_px, by_jnd, pixel, scale_at(by_edge, m.height_px)});
   }
   return {
       "7.3",

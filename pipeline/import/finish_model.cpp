@@ -1,6 +1,7 @@
 #include "pipeline/import/mesh_builder.h"
 
 #include "format/base/text_bytes.h"
+#include "pipeline/import/material_images.h"
 #include "pipeline/import/up_axis.h"
 #include "pipeline/io/table.h"
 #include "stages/geometry/mesh_topology.h"
@@ -323,6 +324,16 @@ void repair_tangents(Model& model) {
   }
 }
 
+/// In white nobody would see the shape.
+void show_without_colour(Model& model) {
+  constexpr float kGrey = 0.6f;  // linear: what plaster has
+  const auto has_none = [](const Material& m) { return m == scan_material(m.name); };
+  if (!model.mesh.colours.empty() || !std::ranges::all_of(model.materials, has_none)) return;
+  for (Material& m : model.materials) m.base_colour = {kGrey, kGrey, kGrey, 1};
+  if (model.notes.empty())  // else they say what is missing
+    add_info(model.notes, "no-colour", "", "the scan has no colour and is shown in light grey");
+}
+
 }  // namespace
 
 void finish_model(Model& model, const std::string& file_name, const ImportOptions& options) {
@@ -341,6 +352,13 @@ void finish_model(Model& model, const std::string& file_name, const ImportOption
   repair_tangents(model);
   bring_uvs_near(model);
   if (options.up > UpAxis::kKeep) turn_up(model.mesh, enum_name(options.up)[0]);
+}
+
+void finish_scan(Model& model, const std::string& file_name, const ImportOptions& options,
+                 const RunContext& context) {
+  show_without_colour(model);
+  finish_model(model, file_name, options);
+  judge_alpha(model, context);
 }
 
 namespace {

@@ -133,8 +133,7 @@ ImportedModel import_stl(const std::string& file_name, std::span<const std::uint
   for (std::size_t i = 0; i + 2 < index.size(); i += 3)
     mesh.triangles.push_back({index[i], index[i + 1], index[i + 2]});
   out.model.materials.push_back(scan_material("untextured"));
-  show_without_colour(out.model);
-  finish_model(out.model, file_name, options);
+  finish_scan(out.model, file_name, options, context);
   return out;
 }
 

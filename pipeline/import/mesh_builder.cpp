@@ -202,15 +202,6 @@ Material scan_material(std::string name) {
   return material;
 }
 
-void show_without_colour(Model& model) {
-  constexpr float kGrey = 0.6f;  // linear: what plaster has
-  const auto has_none = [](const Material& m) { return m == scan_material(m.name); };
-  if (!model.mesh.colours.empty() || !std::ranges::all_of(model.materials, has_none)) return;
-  for (Material& m : model.materials) m.base_colour = {kGrey, kGrey, kGrey, 1};
-  if (model.notes.empty())  // else they say what is missing
-    add_info(model.notes, "no-colour", "", "the scan has no colour and is shown in light grey");
-}
-
 void triangulate_polygon(std::span<const Vec3d> points, std::vector<std::array<std::uint32_t, 3>>& triangles,
                          std::uint64_t& work) {
   triangles.clear();

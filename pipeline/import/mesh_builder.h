@@ -25,10 +25,6 @@ float linear_from_srgb(double srgb);
 /// of OBJ, PLY and STL show a surface (open scans would have holes otherwise).
 Material scan_material(std::string name);
 
-/// Where nothing of a scan has a colour, light grey: in white nobody sees its shape. A note says so where no
-/// other note stands.
-void show_without_colour(Model& model);
-
 /// What one corner of a face carries. Attributes the mesh has not got stay as they are here.
 struct Corner {
   std::uint32_t position = 0;
@@ -84,10 +80,14 @@ inline constexpr std::uint64_t kMaxEarWork = 400'000'000;  // about two seconds
 /// Counts what is left out. Strangers' files may have any number of kinds: those after the 32nd are "others".
 void count_lost(Lost& lost, const std::string& what, std::uint64_t count = 1);
 
-/// Last step of every reader: drops triangles that refer to non-finite positions or UVs (warnings
+/// Last step of the reader of glTF: drops triangles that refer to non-finite positions or UVs (warnings
 /// "non-finite-position", "non-finite-uv": such UVs become 0), unused images and materials; sets part names;
 /// checks the limits; throws InputError when no triangle is left.
 void finish_model(Model& model, const std::string& file_name, const ImportOptions& options);
+/// Last step of all others: also gives a scan without any colour light grey (a note says so where no other
+/// note stands), and judges alpha (material_images.h).
+void finish_scan(Model& model, const std::string& file_name, const ImportOptions& options,
+                 const RunContext& context);
 
 /// Leaves out triangles that nobody sees: those on the three points of an earlier one, turned round, whose
 /// material shows both sides and hides them (opaque, or cut-out by the same texels). Which of the two shows

@@ -1,6 +1,5 @@
 // Where charts lie. Charts are cut class by class, get so many texels as the source has there, are shared out
 // to pages of at most 8192 px, and packed. Triangles without area follow their neighbours.
-#include <numeric>
 #include <unordered_map>
 
 #include "format/base/numbering.h"

@@ -38,35 +38,17 @@ inline Json viewing(PackageReader& package) {
     rules[name] = {{"steps", shown}, {"displayed_px_scale", at}};
   }
   Json parts = Json::array();
-  const ScreenRect object{100, 50, 900, 1250};
-  for (const ScreenRect& view : {ScreenRect{0, 0, 1000, 1400}, ScreenRect{300, 200, 500, 900},
-                                 ScreenRect{850, 0, 1500, 300}, ScreenRect{-50, -50, 10, 10}}) {
-    const VisiblePart part = clip_to(object, view);
+  for (const VisiblePart& part : {VisiblePart{800, 1200, false}, VisiblePart{200, 700, true},
+                                  VisiblePart{50, 250, true}, VisiblePart{0, 0, true}}) {
     Json scales = Json::object();
     for (const auto& [rule, name] : kRules) scales[name] = select_scale(m, 1200, part, rule);
-    parts.push_back({{"view", {view.x0, view.y0, view.x1, view.y1}},
-                     {"part", {part.width_px, part.height_px, part.clipped}},
-                     {"scale_of_1200_px", scales}});
+    parts.push_back({{"part", {part.width_px, part.height_px, part.clipped}}, {"scale_of_1200_px", scales}});
   }
-  const VisiblePart seen = clip_to(object, ScreenCircle{400, 400, fovea_radius_px(1500)});
   const Camera camera;
-  Json errors = Json::array();
-  for (const ManifestScale& s : m.scales) {
-    const PixelError e = pixel_error(m, s, 700);
-    errors.push_back({s.scale, e.p95, e.rms, e.max});
-  }
   return {{"rules", rules},
-          {"object", {object.x0, object.y0, object.x1, object.y1}},
           {"clips", parts},
-          {"fovea",
-           {{"centre_px", {400, 400}},
-            {"eye_px", 1500},
-            {"radius_px", fovea_radius_px(1500)},
-            {"part", {seen.width_px, seen.height_px, seen.clipped}}}},
           {"displayed_px_at_distance_3_heights",
-           displayed_height_px(m.object_height, 3 * m.object_height, camera)},
-          {"distance_at_300_px", viewing_distance(m.object_height, 300, camera)},
-          {"scale_error_p95_rms_max_at_700_px", errors}};
+           displayed_height_px(m.object_height, 3 * m.object_height, camera)}};
 }
 
 /// Sizes along knots between every two rungs, instead of the plane's own.

@@ -5,9 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "format/base/text_bytes.h"
-#include "pipeline/cache/disk_store.h"
 #include "pipeline/io/atomic_file.h"
-#include "pipeline/io/file_resolver.h"
 #include "pipeline/io/table.h"
 #include "tools/cli/options/command_line.h"
 #include "tools/inspect/package_mesh.h"

@@ -3,7 +3,6 @@
 
 #include "delivery/cpp/decide/fragment_list.h"
 #include "format/rules/viewing.h"
-#include "pipeline/about/gltf_about.h"
 #include "pipeline/io/table.h"
 #include "tools/extract/budget/budget_search.h"
 #include "tools/extract/proxy/proxy_search.h"
@@ -159,9 +158,9 @@ std::vector<Extracted> extract_files(PackageReader& package, const ExtractReques
   const About& about = package.about();
   const OutputTransform place =
       output_transform(about, request.recentre ? Vec3d{} : package.manifest().origin, request.keep_units);
-  const std::string notes = placed_notes(package.annotations(), place);
+  const nlohmann::ordered_json notes = placed_notes(package.annotations(), place);
   // In a file for a number of bytes they may take a twentieth, as the words about the object.
-  const std::uint64_t room = notes.empty() ? 0 : notes.size() + kNotesFrameBytes;
+  const std::uint64_t room = notes.empty() ? 0 : notes.dump().size() + kNotesFrameBytes;
   const auto holds_notes = [room](std::uint64_t bytes) {
     return room > 0 && (bytes == 0 || room <= bytes / 20);
   };

@@ -7,7 +7,6 @@
 #include "stages/fill/fill.h"
 #include "stages/fragment_codec/fragment_codec.h"
 #include "stages/image/decode_image.h"
-#include "stages/measure/fragment_meter.h"
 #include "stages/render/shade.h"
 
 namespace texmesh {

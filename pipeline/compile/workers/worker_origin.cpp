@@ -11,7 +11,6 @@
 #include "format/base/text_bytes.h"
 #include "pipeline/compile/stage_table.h"
 #include "pipeline/compile/workers/worker.h"
-#include "pipeline/io/atomic_file.h"
 #include "pipeline/io/program.h"
 #include "pipeline/io/resolver.h"
 

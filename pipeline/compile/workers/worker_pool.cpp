@@ -7,7 +7,6 @@
 
 #include <filesystem>
 #include <nlohmann/json.hpp>
-#include <set>
 
 #include "format/base/text_bytes.h"
 #include "pipeline/cache/cache_layer.h"
@@ -15,7 +14,6 @@
 #include "pipeline/import/import.h"
 #include "pipeline/io/atomic_file.h"
 #include "pipeline/io/exit_codes.h"
-#include "pipeline/io/program.h"
 
 namespace texmesh {
 namespace {

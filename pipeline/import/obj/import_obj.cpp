@@ -629,9 +629,7 @@ ImportedModel import_obj(const std::string& file_name, std::span<const std::uint
   out.normals_by_specification = out.model.mesh.normals.empty() && is_all_flat(data);
   add_notes(data, out.model, out.lost);
   judge_bump_maps(out.model, data.with_bump_map, context);
-  show_without_colour(out.model);
-  finish_model(out.model, file_name, options);
-  judge_alpha(out.model, context);
+  finish_scan(out.model, file_name, options, context);
   return out;
 }
 

@@ -1,6 +1,5 @@
 #include "pipeline/about/source_fields.h"
 #include "pipeline/import/import_images.h"
-#include "pipeline/import/material_images.h"
 #include "pipeline/import/mesh_builder.h"
 #include "pipeline/import/ply/ply_reader.h"
 
@@ -429,9 +428,7 @@ class PlyModel {
     build_mesh();
     tiled_.split(model_, resolver_, file_, options_);
     add_notes(lost);
-    show_without_colour(model_);
-    finish_model(model_, file_, options_);
-    judge_alpha(model_, context_);
+    finish_scan(model_, file_, options_, context_);
     return std::move(model_);
   }
 

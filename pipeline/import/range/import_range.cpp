@@ -5,7 +5,6 @@
 #include "format/base/portable_math.h"
 #include "format/base/text_bytes.h"
 #include "pipeline/import/import_images.h"
-#include "pipeline/import/material_images.h"
 #include "pipeline/import/mesh_builder.h"
 #include "pipeline/import/named_files.h"
 #include "pipeline/import/text_scan.h"
@@ -386,9 +385,7 @@ ImportedModel import_range_scan(const std::string& file_name, std::span<const st
   context.check_cancelled();
   GridMesher(scan, out.model).run();
   add_material(file_name, texture, resolver, options, out.model);
-  show_without_colour(out.model);
-  finish_model(out.model, file_name, options);
-  judge_alpha(out.model, context);
+  finish_scan(out.model, file_name, options, context);
   return out;
 }
 

@@ -25,21 +25,25 @@ int with_all_printed(int exit_code) {
   return exit_code == kExitOk ? kExitModelFailed : exit_code;
 }
 
-/// One line, broken where it is wider than `width`; what follows stands beneath its last column, or item.
-std::string broken_line(const std::string& line, std::size_t width) {
-  if (line.size() <= width) return line;
-  if (line.find_first_not_of(" -") == std::string::npos) return line.substr(0, width);  // beneath a heading
-  const std::size_t gap = line.rfind("  ");
-  std::size_t indent = gap != std::string::npos ? gap + 2 : line.starts_with("- ") ? 2 : 0;
-  if (indent > width / 2) indent = 4;
-  std::string out = line;
-  for (std::size_t begin = 0; begin + width < out.size();) {
-    const std::size_t blank = out.rfind(' ', begin + width);
-    if (blank == std::string::npos || blank <= begin + indent) break;  // a word that is wider
-    out.replace(blank, 1, "\n" + std::string(indent, ' '));
+/// Broken at blanks where it is wider than `width`; what follows stands `indent` to the right. A word that is
+/// wider stays whole.
+std::string broken_line(std::string line, std::size_t indent, std::size_t width) {
+  for (std::size_t begin = 0; begin + width < line.size();) {
+    std::size_t blank = line.rfind(' ', begin + width);
+    if (blank == std::string::npos || blank <= begin + indent) blank = line.find(' ', begin + width);
+    if (blank == std::string::npos) break;
+    line.replace(blank, 1, "\n" + std::string(indent, ' '));
     begin = blank + 1;
   }
-  return out;
+  return line + "\n";
+}
+
+/// What follows stands beneath the last column, or item.
+std::string broken_row(const std::string& line, std::size_t width) {
+  if (line.find_first_not_of(" -") == std::string::npos) return line.substr(0, width) + "\n";  // of a heading
+  const std::size_t gap = line.rfind("  ");
+  const std::size_t indent = gap != std::string::npos ? gap + 2 : line.starts_with("- ") ? 2 : 0;
+  return broken_line(line, indent > width / 2 ? 4 : indent, width);
 }
 
 }  // namespace
@@ -53,26 +57,13 @@ std::size_t help_width() {
 }
 
 std::string wrapped_text(const std::string& text, std::size_t column, std::size_t indent) {
-  const std::size_t width = help_width();
-  std::istringstream words(text);
-  std::string out;
-  bool first = true;
-  for (std::string word; words >> word; first = false) {
-    if (!first && column + 1 + word.size() > width) {
-      out += "\n" + std::string(indent, ' ');
-      column = indent;
-    } else if (!first) {
-      out += ' ', ++column;
-    }
-    out += word, column += word.size();
-  }
-  return out + "\n";
+  return broken_line(std::string(column, ' ') + text, indent, help_width()).substr(column);
 }
 
 std::string wrapped_lines(const std::string& text, std::size_t width) {
   std::istringstream lines(text);
   std::string out;
-  for (std::string line; std::getline(lines, line);) out += broken_line(line, width) + "\n";
+  for (std::string line; std::getline(lines, line);) out += broken_row(line, width);
   return out;
 }
 

@@ -4,7 +4,6 @@
 #include "format/base/portable_math.h"
 #include "stages/base/loss_curve.h"
 #include "stages/base/parallel.h"
-#include "stages/image/decode_image.h"
 
 namespace texmesh {
 namespace {

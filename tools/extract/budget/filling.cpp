@@ -3,7 +3,6 @@
 #include <numeric>
 
 #include "format/base/portable_math.h"
-#include "pipeline/about/gltf_about.h"
 #include "stages/base/parallel.h"
 
 namespace texmesh {

@@ -381,17 +381,16 @@ bool add_words(Bytes& glb, const About& about, std::uint64_t bytes) {
   return false;
 }
 
-std::string placed_notes(const Annotations& annotations, const OutputTransform& place) {
-  if (annotations.list.empty()) return "";
+Json placed_notes(const Annotations& annotations, const OutputTransform& place) {
   Annotations placed = annotations;
   const OutputTransform turn{.origin = {}, .up = place.up};
   transform_annotations(placed, place, turn);
-  return Json::parse(write_annotations(placed))["annotations"].dump();
+  return annotations_json(placed)["annotations"];
 }
 
-void add_notes(Bytes& glb, const std::string& notes) {
+void add_notes(Bytes& glb, Json notes) {
   GlbParts parts = read_glb(glb, "file");
-  parts.root["extras"]["texmesh"]["annotations"] = Json::parse(notes);
+  parts.root["extras"]["texmesh"]["annotations"] = std::move(notes);
   glb = glb_container(parts.root.dump(-1, ' ', false, Json::error_handler_t::replace), parts.binary);
 }
 

@@ -83,10 +83,11 @@ About reserved_about(const About& about, const OutputTransform& transform, std::
 /// Puts the most words about the object into a finished file that `bytes` hold. False where some do not fit.
 bool add_words(std::vector<std::uint8_t>& glb, const About& about, std::uint64_t bytes);
 
-/// The notes of a package in the coordinates of a file that was placed so, as JSON; "" without any.
-std::string placed_notes(const Annotations& annotations, const OutputTransform& place);
+/// The notes of a package in the coordinates of a file that was placed so, as JSON; an empty list without
+/// any.
+nlohmann::ordered_json placed_notes(const Annotations& annotations, const OutputTransform& place);
 /// Puts them into a finished file: extras.texmesh.annotations of the root (SPEC.md, A.9).
-void add_notes(std::vector<std::uint8_t>& glb, const std::string& notes);
+void add_notes(std::vector<std::uint8_t>& glb, nlohmann::ordered_json notes);
 
 /// The normals of a scale that the vertex-split stream alone has. kFitted: so that it is lit as S_0 is, which
 /// takes the whole stream. kStreamed: S_0's, as the stream's prefix of the scale has them. kHasty: the same

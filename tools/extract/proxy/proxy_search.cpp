@@ -2,7 +2,6 @@
 
 #include "format/base/portable_math.h"
 #include "format/rules/proxy_choice.h"
-#include "pipeline/about/gltf_about.h"
 #include "pipeline/io/file_resolver.h"
 #include "stages/base/float_math.h"
 #include "stages/condition/condition.h"
@@ -223,7 +222,7 @@ std::optional<ProxyParts> ProxyParts::read(std::span<const std::uint8_t> glb, co
     return std::nullopt;
   out.meshes_ = thinner_meshes(model.mesh, context);
   for (const char* list : {"bufferViews", "accessors", "meshes", "buffers"}) chunks.root.erase(list);
-  out.json_ = chunks.root.dump();
+  out.root_ = std::move(chunks.root);
   return out;
 }
 
@@ -235,7 +234,7 @@ const ProxyMap* ProxyParts::map_of(ProxyMap::Use use) const {
 double ProxyParts::extent() const { return longest_side(meshes_.front()); }
 
 Json ProxyParts::materials_of(const ProxyMapChoice& choice) const {
-  Json root = Json::parse(json_);
+  Json root = root_;
   const ProxyMap* data = map_of(Use::kData);
   for (Json& material : root["materials"]) {
     if (!choice.data && slot_of(material, kSlots[1])) use_means(material, data->pixels);

@@ -58,7 +58,7 @@ class ProxyParts {
   const ProxyMap* map_of(ProxyMap::Use use) const;
   nlohmann::ordered_json materials_of(const ProxyMapChoice& choice) const;
   std::string entry_;
-  std::string json_;  // of the file, without its mesh
+  nlohmann::ordered_json root_;  // of the file, without its mesh
   std::vector<Mesh> meshes_;
   std::vector<ProxyMap> maps_;  // by image of the file
 };

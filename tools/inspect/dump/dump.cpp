@@ -585,7 +585,7 @@ constexpr PartWriters kWriters[] = {
     {annotations_text,
      [](PackageReader& p, DumpGamma) {
        const Annotations& all = p.annotations();
-       return all.list.empty() ? Json::object() : Json::parse(write_annotations(all));
+       return all.list.empty() ? Json::object() : annotations_json(all);
      }},
     {provenance_text, [](PackageReader& p, DumpGamma) {
        return Json{{"provenance", Json::parse(checked(p, p.manifest().provenance, read_provenance))}};

@@ -88,10 +88,8 @@ std::string download_line(const std::string& name, std::uint64_t bytes) {
 /// Notes as <model-viewer> shows them: buttons at points of the GLB, which `place` has placed.
 std::string hotspots(PackageReader& package, const OutputTransform& place) {
   std::string out;
-  const std::string json = placed_notes(package.annotations(), place);
-  if (json.empty()) return out;
   int number = 0;
-  for (const Json& note : Json::parse(json)) {
+  for (const Json& note : placed_notes(package.annotations(), place)) {
     const auto words = [](const Json& v, const char* unit) {
       return fmt::format("{0}{3} {1}{3} {2}{3}", v[0].get<double>(), v[1].get<double>(), v[2].get<double>(),
                          unit);

@@ -131,10 +131,6 @@ export class ShownPlanes {
     return planesWithin(new TextureLoss(this.data, this.load_.view.display.heightPx), choices, room,
       [this.ways[this.way_]]);
   }
-  /** Bytes of the planes that are shown. */
-  get gpuBytes(): number {
-    return [...this.set_.planes.values()].reduce((sum, p) => sum + this.ways[this.way_ ?? 0](p.plane), 0);
-  }
   /** Memory for the textures beside a scale. */
   private room_(scale: number): number {
     const { memoryBytes, reader: { manifest } } = this.load_;

@@ -14,6 +14,7 @@ import { nextTurn, nowS, sleepS } from '../http/requests';
 import type { PlaneComposer } from './composer';
 import { FetchInTime, certain, composeS } from './fetch_in_time';
 import { FragmentFetch, allWishes, bestWishes, requestBytes } from './fragment_fetch';
+import { gpuBytes } from './gpu';
 import type { LoadContext } from './load_context';
 import type { ScaleSource } from './scale_source';
 import { ShownPlanes, readPlaneData } from './shown_planes';
@@ -302,12 +303,12 @@ export class TextureLoad {
   }
   /** The scale that refining ends with, within the memory that planes leave. */
   private refinedScale_(enough = this.scale_.wanted): number {
-    const { planes_: { data, gpuBytes }, load_: { override, memoryBytes, view: { display } } } = this;
+    const { planes_: { data }, load_: { override, memoryBytes, view: { display } } } = this;
     const { heightPx, part } = display;
     const finest = this.scaleFor_(heightPx, part, true);
     if (override.scale !== undefined || finest === this.scaleFor_(heightPx, part)) return enough;
-    const fitting =
-      data.manifest.scales.find((s) => s.scale >= finest && gpuBytes + scaleBytes(s) <= memoryBytes);
+    const roomBytes = memoryBytes - gpuBytes([], [], this.planes_.all());
+    const fitting = data.manifest.scales.find((s) => s.scale >= finest && scaleBytes(s) <= roomBytes);
     return Math.min(enough, refinedScale(data, heightPx, fitting?.scale ?? enough));
   }
   /**

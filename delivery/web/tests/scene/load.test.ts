@@ -1,6 +1,7 @@
 import { type BufferGeometry, type EventDispatcher, type Material, type Mesh, PerspectiveCamera,
   SphereGeometry } from 'three';
 import { describe, expect, it } from 'vitest';
+import { scaleBytes, textureBytes } from '../../src/decide/gpu_size';
 import { selectScale, stepFunction } from '../../src/decide/viewing';
 import { InputError, PackageReader } from '../../src/reader';
 import { fakeServer } from '../support/fake_server';
@@ -131,18 +132,56 @@ describe('a load', () => {
     }
   });
   it('refines no mesh that takes more than the memory', async () => {
-    const { steps: [{ scale, upToPx }] } = reader.manifest;
-    const leastBytes = 262980; // of its planes
-    for (const memoryBytes of [2.2e5, 3e5, 4e6]) {
+    const { scales, steps: [{ scale, upToPx }] } = reader.manifest;
+    const smallest = Math.max(...planes.map((p) => p.mip));
+    const leastBytes = scaleBytes(scales.at(-2)!) + planes.filter((p) => p.mip === smallest)
+      .reduce((sum, { widthPx, heightPx }) => sum + textureBytes(widthPx, heightPx), 0);
+    for (const memoryBytes of [leastBytes - 1, leastBytes, 4e6]) {
       const l = await loading(url, fakeServer(files),
         { time: 0, memoryBytes, autoRefine: false, display: () => upToPx });
       await l.model.done;
       await l.model.refine();
       const { gpuBytes, wantedScale } = l.model.state;
-      if (memoryBytes > leastBytes) expect(gpuBytes).toBeLessThanOrEqual(memoryBytes);
-      expect([memoryBytes, wantedScale < scale]).toEqual([memoryBytes, memoryBytes > leastBytes]);
+      expect(gpuBytes).toBeLessThanOrEqual(memoryBytes);
+      expect([memoryBytes, wantedScale < scale]).toEqual([memoryBytes, memoryBytes >= leastBytes]);
       l.dispose();
     }
+  });
+  it('lets no view wait for a mesh that refining has asked for', async () => {
+    const { steps: [{ scale, upToPx }] } = reader.manifest;
+    let px = upToPx / 3, end = (): void => undefined; // small planes do
+    const slow = new Promise<void>((go) => (end = go));
+    let isSlow = false;
+    const parseAsync = () => (isSlow ? slow.then(() => fakeGltf()) : Promise.resolve(fakeGltf()));
+    const l = await loading(url, fakeServer(files), { time: 0, autoRefine: false, display: () => px,
+      gltfLoader: () => ({ register: () => undefined, parseAsync }) as never });
+    await l.model.done;
+    isSlow = true;
+    const first = l.model.refine();
+    expect(await until(() => l.model.state.wantedScale < scale)).toBe(true);
+    const before = l.count('plane');
+    px = 4000; // asks for larger planes
+    l.model.update();
+    void l.model.refine();
+    expect(await until(() => l.count('plane') > before)).toBe(true);
+    expect(l.model.state.scale).toBe(scale);
+    end();
+    await first;
+    expect(l.model.state.scale).toBeLessThan(scale);
+    l.dispose();
+  });
+  it('asks again for a mesh that refining has lost', async () => {
+    const { scales, steps: [{ scale, upToPx }] } = reader.manifest;
+    const meshes = scales.filter((s) => s.scale < scale).map((s) => s.glb);
+    let faults = 0;
+    const server = fakeServer(files, { fault: ({ range }) =>
+      faults === 0 && meshes.some((m) => within(range, m)) && (++faults, 'status-404') });
+    const l = await loading(url, server, { time: 0, autoRefine: false, display: () => upToPx });
+    await l.model.done;
+    await l.model.refine();
+    expect([faults, l.count('error'), l.model.state.wantedScale]).toEqual([1, 1, scale]);
+    expect(await until(() => l.model.state.scale < scale)).toBe(true); // two seconds later
+    l.dispose();
   });
   it('does not ask again and again for what cannot be had', async () => {
     const server =

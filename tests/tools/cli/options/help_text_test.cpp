@@ -137,7 +137,7 @@ TEST(WrappedLines, GoOnBeneathTheirLastColumnOrItem) {
   EXPECT_EQ(wrapped_lines("  a  bb cc dd ee\n  -------  ------------\nshort\n", 12),
             "  a  bb cc\n     dd ee\n  -------  -\nshort\n");
   const std::string word(40, 'x');
-  EXPECT_EQ(wrapped_lines(word + " y", 20), word + " y\n") << "a word is not cut";
+  EXPECT_EQ(wrapped_lines(word + " y", 20), word + "\ny\n") << "a word is not cut";
 }
 
 }  // namespace texmesh::testing::help_text_test
