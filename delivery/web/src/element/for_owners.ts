@@ -29,11 +29,11 @@ export function causeOf(error: unknown, url: string, page: string): string {
     return 'What the server sent is no texmesh package. A host that answers unknown addresses with its ' +
       'start page does so where the address is wrong.';
   if (/it was replaced/.test(found))
-    return 'The file changes from answer to answer. Several servers behind one address must send the same ' +
-      'ETag for a file, or none.';
+    return 'The file changes from answer to answer: the servers behind its address have several versions.';
   const { origin } = new URL(page);
   if (error instanceof InputError && status === 0)
-    return new URL(url, page).origin === origin ? 'The server did not answer.'
+    return new URL(url, page).origin === origin
+      ? 'The server did not answer, or it sends the request on to a host that does not allow it (CORS).'
       : `The server did not answer, or it does not let ${origin} read its files: it must send ` +
         'Access-Control-Allow-Origin (CORS).';
   return rule && `${rule} is a rule of texmesh's format/SPEC.md: the file is damaged, or a newer format.`;

@@ -49,7 +49,7 @@ export class HttpClient {
     const abort = new AbortController();
     const cancel = (): void => abort.abort();
     const answer: Answer = { url, status: 0, problem: '', body: new Uint8Array(0), etag: '', type: '',
-      length: -1, complete: false, tooLong: false };
+      encoding: '', length: -1, complete: false, tooLong: false };
     const record: RequestRecord = {
       url, offset: range?.offset ?? 0, bytes: range?.bytes ?? -1, received: 0, kind,
       started: nowS(), firstByte: -1, ended: 0, status: 0, ok: false,
@@ -81,10 +81,10 @@ export class HttpClient {
       const length = status === 200 && /^\d{1,15}$/.test(header('content-length'))
         ? Number(header('content-length')) : -1;
       Object.assign(answer, { status, url: response.url || url, etag: etag[0] === '"' ? etag : '', length,
-        type: header('content-type'), retryAfterS: Number(header('retry-after')),
+        type: header('content-type'), encoding: header('content-encoding').replace(/^\W*identity\W*$/, ''),
+        retryAfterS: Number(header('retry-after')),
         range: contentRange(header('content-range')) });
-      this.compressed ||= status < 300 && !/json|html/.test(answer.type) &&
-        /\w/.test(header('content-encoding').replace('identity', ''));
+      this.compressed ||= status < 300 && !/json|html/.test(answer.type) && answer.encoding !== '';
       const reader = record.ok ? body?.getReader() : undefined;
       while (reader && !answer.tooLong) {
         const { done, value } = await reader.read();

@@ -37,6 +37,8 @@ export interface Mirror {
   /** URL that answers come from, behind redirections. */
   at: string;
   etag: string;
+  /** Asked for once an answer has another ETag: the package begins as it did, so ETags say nothing here. */
+  sameStart?: Promise<void>;
   /** Bytes of the container; -1 = not known. */
   total: number;
   throughput: TransferRate;

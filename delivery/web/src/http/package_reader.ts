@@ -30,13 +30,14 @@ export async function openStore(url: string, mirrors: readonly string[], mode: S
   try {
     return { store, manifest: await store.manifest(signal) };
   } catch (error) {
-    const { noRanges } = store;
+    const { noRanges, unanswered } = store;
     // Whole files are better than nothing, whatever other mirrors answered.
-    if (!noRanges || isAbort(error)) throw error;
-    if (mode === 'range') throw noRanges;
-    const { openWithoutRanges } = await files().catch(() => {
-      throw noRanges;
+    if (!(noRanges || unanswered) || isAbort(error)) throw error;
+    if (mode === 'range') throw noRanges ?? error;
+    const { openWithoutRanges, sendsWholeAlone } = await files().catch(() => {
+      throw noRanges ?? error;
     });
+    if (!noRanges && !(await sendsWholeAlone(url, client, signal))) throw error;
     return openWithoutRanges(urls, client, signal);
   }
 }

@@ -27,6 +27,9 @@ class RangesEnded extends InputError {}
 export class RangeStore implements PackageStore {
   /** Error of a server that knows no ranges. */
   noRanges?: InputError;
+  /** The first request has had no answer. */
+  unanswered = false;
+  private start_ = new Uint8Array(0);
   private tree_?: Promise<PackageStore>;
   private form_: PackageForm = 'range';
   private parts_: { begin: number; bytes: Uint8Array }[] = []; // the last read first
@@ -46,7 +49,7 @@ export class RangeStore implements PackageStore {
   async manifest(signal?: AbortSignal): Promise<Uint8Array> {
     const bytes = Math.max(bootstrapBytes, this.mirrors_.client.options.startBytes);
     const start = await this.readRange_({ offset: 0, bytes }, { kind: 'manifest', signal });
-    return start.subarray(0, bootstrapBytes);
+    return (this.start_ = start.subarray(0, bootstrapBytes));
   }
 
   async read(place: Place, range: ByteRange, how: ReadOptions): Promise<Uint8Array> {
@@ -54,6 +57,11 @@ export class RangeStore implements PackageStore {
     try {
       return await this.readRange_(range, how);
     } catch (error) {
+      // Damaged bytes may be those of another package; else nobody knows.
+      if (error instanceof FormatError && how.verify && !/replaced/.test(error.found))
+        await this.requireStart_(this.mirrors_.all.find((m) => m.alive)!, 'other bytes').catch((now) => {
+          if (now instanceof FormatError) throw now;
+        });
       if (!(error instanceof RangesEnded) || !this.openTree_) throw error;
       this.tree_ ??= this.openTree_(manifestOfContainer(await this.manifest(), this.name), how.signal);
       this.tree_.then(() => (this.form_ = 'files'), () => (this.tree_ = undefined));
@@ -113,27 +121,48 @@ export class RangeStore implements PackageStore {
         onBytes: (n) => onBytes?.(before + n),
       });
       m.at = a.url;
-      // 416 of the first bytes: an empty file, or a server that refuses parts.
-      if ((a.status === 200 || a.status === 416) && m.total < 0)
+      // 416 of the first bytes: an empty file, or a server that refuses parts. Or what came is no part as it
+      // is stored.
+      const isNone = a.status === 200 || a.status === 416;
+      const isPart = a.status !== 206 || (!a.tooLong && (a.complete || !a.encoding) &&
+        (a.range || !sameOrigin(a.url)));
+      if (m.total < 0 && (isNone || (offset === 0 && !isPart)))
         throw (this.noRanges = new InputError(shownUrl(m.url), '', 'a server that answers ranges',
           whatCame(a)));
       if (a.status === 200 && isSameFile(a, m))
         throw new RangesEnded(shownUrl(m.url), `byte ${offset}`, 'an answer with status 206',
           'status 200: ranges are no longer answered');
-      if (a.status === 200 || a.status === 416) this.requireSame_(m, false, offset, `status ${a.status}`);
+      if (isNone) this.requireSame_(m, false, offset, `status ${a.status}`);
       if (a.status === 206) {
         this.checkRange_(m, a, range);
+        if (offset > 0 && a.etag && a.etag !== m.etag)
+          try {
+            await (m.sameStart ??= this.requireStart_(m, 'another ETag'));
+          } catch (error) {
+            m.sameStart = undefined;
+            throw error;
+          }
         chunks.push(a.body);
         have += a.body.length;
         if (a.complete) {
-          if (have === bytes || m.total <= offset + have) return concat(chunks); // -1: not known
+          const isEnd = m.total < 0 ? offset === 0 : m.total <= offset + have;
+          if (have === bytes || isEnd) return concat(chunks);
           if (a.body.length >= leastPart) continue; // some servers send no more at once
         }
       }
-      if ((asking.othersLeft && have === before) || !(await mayTryAgain(a)))
+      if ((asking.othersLeft && have === before) || !(await mayTryAgain(a))) {
+        this.unanswered ||= a.status === 0 && m.total < 0 && !/^no byte/.test(a.problem);
         throw new InputError(shownUrl(m.url), `byte ${range.offset}`, 'an answer with status 206',
           whatCame(a));
+      }
     }
+  }
+  /** Throws where the package begins with other bytes now. */
+  private async requireStart_(m: Mirror, found: string): Promise<void> {
+    const { start_: start, mirrors_: { client: { options: { stallTimeoutS } } } } = this;
+    const now = await this.fetchFrom_(m, { stallTimeoutS, reload: true, othersLeft: false }, 0, start.length,
+      { kind: 'manifest' });
+    this.requireSame_(m, `${now}` === `${start}`, 0, found);
   }
   private require_({ url }: Mirror, good: boolean, offset: number, expected: string, found: unknown): void {
     if (!good) throw new FormatError(shownUrl(url), `byte ${offset}`, expected, `${found}`);
@@ -144,16 +173,11 @@ export class RangeStore implements PackageStore {
       `${found}: it was replaced, open it anew`);
   }
   /** Requires an answer from the file that reading began with, and with the range that was asked for. */
-  private checkRange_(m: Mirror, { range, etag, url, complete, body }: Answer,
+  private checkRange_(m: Mirror, { range, etag, url }: Answer,
       { offset, bytes }: { offset: number; bytes: number }): void {
-    this.requireSame_(m, !m.etag || !etag || etag === m.etag, offset, 'another ETag');
     m.etag ||= etag;
-    // Another origin may keep Content-Range to itself; then the length alone is checked.
-    if (!range) {
-      this.require_(m, !sameOrigin(url), offset, 'a Content-Range', 'none that can be read');
-      return this.require_(m, !complete || offset === 0 || body.length === bytes, offset, `${bytes} bytes`,
-        body.length);
-    }
+    // Another origin may keep Content-Range to itself; then digests alone tell.
+    if (!range) return this.require_(m, !sameOrigin(url), offset, 'a Content-Range', 'none that can be read');
     const [first, last] = range;
     const total = range[2] < 0 ? m.total : range[2];
     this.requireSame_(m, m.total < 0 || total === m.total, offset, `${total} bytes`);

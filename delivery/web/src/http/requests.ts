@@ -66,6 +66,8 @@ export interface Answer {
   etag: string;
   /** Content-Type; '' = not said. */
   type: string;
+  /** Content-Encoding, where that header may be read; '' = none. */
+  encoding: string;
   /** Content-Length of a whole file; -1 = not said. */
   length: number;
   /** Content-Range, when that header may be read: first and last byte, bytes of the file (-1 = not said). */
@@ -116,5 +118,6 @@ export function isForGood(error: unknown): boolean {
 
 /** An answer's problem or status, for messages. */
 export function whatCame(a: Answer): string {
-  return a.problem || (a.status > 0 ? `status ${a.status}${a.type && ` (${a.type})`}` : 'no answer');
+  const said = a.problem || (a.status > 0 ? `status ${a.status}${a.type && ` (${a.type})`}` : 'no answer');
+  return said + (a.encoding && `, Content-Encoding: ${a.encoding}`);
 }

@@ -170,6 +170,17 @@ export async function openSameTree(urls: readonly string[], client: HttpClient, 
   return store;
 }
 
+/**
+ * Whether a server gives no answer to a range, and one to a request for the whole file: browsers refuse a
+ * compressed range, as they asked for none.
+ */
+export async function sendsWholeAlone(url: string, client: HttpClient,
+    signal?: AbortSignal): Promise<boolean> {
+  const how = { kind: 'other', signal, reload: true, maxBytes: 0 } as const;
+  return (await client.get(url, how)).status === 200 &&
+    (await client.get(url, { ...how, range: { offset: 0, bytes: 1 } })).status === 0;
+}
+
 /** Opens the tree beside a container, or the whole container. */
 export async function openWithoutRanges(urls: readonly string[], client: HttpClient,
     signal?: AbortSignal): Promise<OpenedStore> {

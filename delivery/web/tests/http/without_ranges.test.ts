@@ -54,6 +54,28 @@ describe('a server that stops answering ranges', () => {
   });
 });
 
+describe('a server that compresses whatever is asked for, or sends ranges that are none', () => {
+  it('is read as one without ranges', async () => {
+    for (const kind of ['gzip', 'gzip-refused', 'bare'] as const) {
+      const server = range(() => kind);
+      const reader = await openRetrying(server);
+      expect(await readSome(reader)).toBe(expected);
+      expect(reader.form).toBe('whole');
+      expect(reader.client.compressed).toBe(kind !== 'bare');
+      expect(server.log.length).toBeLessThan(12);
+    }
+  });
+  it('is told with the header where ranges are insisted on', async () => {
+    const error = await rejection(openAt(range(() => 'gzip'), { mode: 'range' }));
+    expect(error.message).toContain('more bytes than were asked for, Content-Encoding: gzip');
+  });
+  it('one that is away is asked once more, and not for all', async () => {
+    const server = range(() => 'refused');
+    expect((await rejection(openAt(server))).message).toContain('connection refused');
+    expect(server.log.length).toBe(3);
+  });
+});
+
 describe('a server without ranges', () => {
   it('the tree beside the container is taken', async () => {
     const server = await tree();

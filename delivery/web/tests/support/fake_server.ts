@@ -5,7 +5,7 @@ export interface Fault {
 }
 export type FaultKind = 'status-500' | 'status-404' | 'status-416' | 'refused' | 'cut' | 'stall' | 'short'
   | 'long' | 'whole' | 'whole-other' | 'whole-longer' | 'flip' | 'flip-last' | 'wrong-range' | 'other-etag'
-  | 'page' | 'no-total' | 'part' | 'crumb' | 'busy';
+  | 'gzip' | 'gzip-refused' | 'bare' | 'other-file' | 'page' | 'no-total' | 'part' | 'crumb' | 'busy';
 
 export interface FakeServer {
   fetch: typeof fetch;
@@ -43,7 +43,7 @@ export function fakeServer(files: Record<string, Uint8Array>,
     const headers = new Headers();
     // The length alone tells a file that is longer now.
     if (kind !== 'whole-longer')
-      headers.set('ETag', kind === 'other-etag' || kind === 'whole-other' ? '"other"' : `"${file.length}"`);
+      headers.set('ETag', /^(other-|whole-other)/.test(kind ?? '') ? '"other"' : `"${file.length}"`);
     let body = kind === 'whole-longer' ? new Uint8Array([...file, 0]) : file;
     let status = 200;
     if (range && options.ranges !== false && !kind?.startsWith('whole')) {
@@ -64,6 +64,12 @@ export function fakeServer(files: Record<string, Uint8Array>,
       body = body.slice();
       body[body.length - 1] ^= 0x10;
     }
+    if (kind === 'other-file') body = body.map((byte) => byte ^ 0x10);
+    // A host that compresses whatever is asked for: a browser refuses the answer to a range, or decodes it.
+    if (kind === 'gzip-refused' && range) throw new TypeError('content decoding failed');
+    if (kind === 'gzip' || kind === 'gzip-refused') headers.set('Content-Encoding', 'gzip');
+    if (kind === 'gzip' && range) body = new Uint8Array(2 * body.length);
+    if (kind === 'bare') headers.delete('Content-Range');
     headers.set('Content-Length', String(body.length));
     if (kind === 'short') body = body.subarray(0, body.length - 1);
     if (kind === 'long') body = new Uint8Array([...body, 0]);
