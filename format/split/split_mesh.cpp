@@ -14,13 +14,6 @@ std::vector<std::uint32_t> SplitMesh::visible_faces() const {
   return visible;
 }
 
-std::vector<std::array<std::uint32_t, 3>> SplitMesh::face_wedges() const {
-  std::vector<std::array<std::uint32_t, 3>> out;
-  out.reserve(faces_.size());
-  for (const Face& f : faces_) out.push_back(f.wedge);
-  return out;
-}
-
 void SplitMesh::reserve(std::size_t points, std::size_t wedges, std::size_t faces) {
   points_.reserve(points);
   ring_.reserve(points);

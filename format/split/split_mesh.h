@@ -49,7 +49,6 @@ class SplitMesh {
   const std::vector<Point>& points() const { return points_; }                    // places on the grid
   const std::vector<std::uint32_t>& wedge_point() const { return wedge_point_; }  // per wedge
   std::size_t face_count() const { return faces_.size(); }
-  std::vector<std::array<std::uint32_t, 3>> face_wedges() const;  // per face
   const std::vector<std::uint16_t>& face_group() const { return face_group_; }
   /// Numbers of attribute k of all wedges, one wedge after the other.
   const std::vector<std::int32_t>& values(std::size_t k) const { return values_[k]; }

@@ -189,6 +189,7 @@ std::uint64_t triangles_of_primitive(const nlohmann::json& primitive, const nloh
   return std::min<std::uint64_t>(number(accessors[accessor], "count", 0), 1ull << 40) / 3;
 }
 
+/// The import parses the JSON again: this is asked before any stage runs, and a stage is given bytes.
 std::uint64_t triangles_of_glb(std::span<const std::uint8_t> bytes) {
   if (bytes.size() < 20) return 0;
   const auto json_bytes = value_at<std::uint32_t>(bytes.data() + 12);

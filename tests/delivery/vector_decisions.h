@@ -79,8 +79,7 @@ inline Json play(const std::string& name, const std::vector<FragmentOffer>& offe
               {"rungs", plan.rungs()},
               {"throughput_bytes_s", plan.throughput_bytes_s()},
               {"surplus_s", plan.surplus_s()},
-              {"unspent_s", plan.unspent_s()},
-              {"too_short_for_rtt", plan.too_short_for_rtt()}};
+              {"unspent_s", plan.unspent_s()}};
   if (theorem && options.htc.window == 1 && !fail_each) result["theorem"] = theorem(plan);
   return {{"name", name},
           {"offers", offers_json(offers)},

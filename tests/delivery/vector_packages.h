@@ -9,6 +9,7 @@
 #include "format/split/split_reader.h"
 #include "format/split/split_stream.h"
 #include "tests/delivery/vectors.h"
+#include "tests/support/face_wedges.h"
 
 namespace texmesh {
 
@@ -266,7 +267,7 @@ inline Json split_stream(PackageReader& package) {
                    {"visible_faces", mesh.visible_faces().size()},
                    {"points_sha256", digest_of(mesh.points())},
                    {"wedge_points_sha256", digest_of(mesh.wedge_point())},
-                   {"faces_sha256", digest_of(mesh.face_wedges())},
+                   {"faces_sha256", digest_of(testing::face_wedges(mesh))},
                    {"groups_sha256", digest_of(mesh.face_group())},
                    {"values_sha256", attributes}});
   }

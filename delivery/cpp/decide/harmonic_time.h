@@ -181,8 +181,6 @@ class HarmonicTimePlan {
   double unspent_s() const { return unspent_s_; }
   /// Chosen rung by offer; -1 skipped or not decided.
   std::vector<std::int32_t> rungs() const;
-  /// A limit under 30 round trips cannot be met well (p95 beyond 2.5 %).
-  bool too_short_for_rtt() const { return options_.time_limit_s < 30 * options_.rtt_s; }
 
   // What policies ask of their plan.
 

@@ -161,6 +161,25 @@ TEST(DeliveryPlan, TimeThatIsLeftGoesIntoAFinerScale) {
   EXPECT_EQ(scale(late), 9) << "no time is left even behind the coarsest";
 }
 
+TEST(DeliveryPlan, AFinerMeshLeavesTexturesHalfOfTheTime) {
+  PackageReader package = open_package(Proxies::kNone);
+  int taken = 0, refused = 0;
+  for (double bytes_s = 2e4; bytes_s < 1e6; bytes_s *= 1.05) {
+    DeliveryRequest by_hand = request(60, bytes_s);
+    const int scale = plan_delivery(package, by_hand).scale;
+    by_hand.scale = 9;
+    const DeliveryPlan enough = plan_delivery(package, by_hand);
+    by_hand.scale = 0;
+    const DeliveryPlan finer = plan_delivery(package, by_hand);
+    if (finer.flip >= 0.9 * enough.flip || finer.mesh_s >= 5) continue;  // it would not pay
+    const bool leaves_half = 5 - finer.mesh_s >= 0.5 * (5 - enough.mesh_s);
+    ++(leaves_half ? taken : refused);
+    EXPECT_EQ(scale == 0, leaves_half) << bytes_s;
+  }
+  EXPECT_GT(taken, 0);
+  EXPECT_GT(refused, 0);
+}
+
 TEST(DeliveryPlan, AProxyThatLooksWorseIsNotShown) {
   PackageReader package = open_package(Proxies::kBad);
   for (const double px : {60.0, 512.0, 3000.0}) {

@@ -104,14 +104,15 @@ function timesOf(m: Manifest, request: DeliveryRequest, scale: number) {
   return { ...times, step, moved: fixed, fromS: step.atS, meshS: fetchedS(link, step.atS, fixed), allBytes };
 }
 /** A proxy alone. */
-function planOfProxy(m: Manifest, { link, displayedPx }: DeliveryRequest, proxy: number): DeliveryPlan {
+function planOfProxy(m: Manifest, { link, displayedPx, timeLimitS }: DeliveryRequest,
+    proxy: number): DeliveryPlan {
   const { allBytes, firstPictureS, meshS } = timesWith(m, link, proxyBytesBeyondStart(m, proxy));
   const mesh = scaleBytes(m.proxies[proxy]);
   const { flip } = proxyLoss(m, proxy, displayedPx);
   const none = everyGroup(0);
   return {
     scale: m.scales[m.scales.length - 1].scale, proxy, planes: [], rungs: [], bytes: 0, endS: 0,
-    late: false,
+    leftS: timeLimitS - meshS,
     list: { offers: [], fragments: [], groups: [], groupWeights: everyGroup(1), previewLoss: none },
     flip, textureFlip: flip, fixedBytes: allBytes, firstPictureS, meshS, completeS: meshS,
     gpuBytes: { mesh, textures: proxyBytes(m.proxies[proxy]) - mesh },

@@ -19,8 +19,8 @@ export interface InTime extends Simulated {
   flip: number;
   /** What it would be of S_0 with these textures. */
   textureFlip: number;
-  /** No time is left after the mesh. */
-  late: boolean;
+  /** Seconds of the time that are left after the mesh; none where it comes too late. */
+  leftS: number;
 }
 /** Display, scales and link that a choice is made for. */
 export interface InTimeRequest {
@@ -81,7 +81,7 @@ function* texturesFor(loss: TextureLoss, request: InTimeRequest, scale: number, 
   const losses = lossesOf(list, rungs);
   const { data: { quality }, displayedPx } = loss;
   return { ...played, scale, planes, list, flip: pictureFlip(quality, displayedPx, scale, losses),
-    textureFlip: textureFlip(quality, losses), late: timeLimitS <= 0, rungs, planned };
+    textureFlip: textureFlip(quality, losses), leftS: timeLimitS, rungs, planned };
 }
 /** Textures beside one scale; the generator gives the page a turn between its steps. */
 function* texturesInTime(loss: TextureLoss, request: InTimeRequest, scale: number): Generator<void, InTime> {
@@ -101,18 +101,17 @@ function* texturesInTime(loss: TextureLoss, request: InTimeRequest, scale: numbe
 function* betterScale(loss: TextureLoss, request: InTimeRequest, finest: number, end: number,
     enough?: InTime): Generator<void, InTime | undefined> {
   const { data: { manifest, quality }, displayedPx } = loss;
-  const leftS = (scale: number): number => request.afterMesh(scale).plan.timeLimitS;
-  const leastLeftS = enough ? finerLeaves * leftS(enough.scale) : 0;
+  const leastLeftS = enough ? finerLeaves * enough.leftS : 0;
   let best = enough;
   for (const { scale } of manifest.scales) {
     if (scale < finest || scale >= end) continue;
     // A mesh that comes too late is no picture in the time.
-    const most: number = !best || best.late ? Infinity
+    const most: number = !best || best.leftS <= 0 ? Infinity
       : best === enough ? finerPays * best.flip : best.flip - worthwhileFlip;
     // With the source's texels.
     if (geometryFlip(quality, displayedPx, scale) >= most) continue;
     const now = yield* texturesInTime(loss, request, scale);
-    if (most === Infinity || (now.flip < most && !now.late && !(leftS(scale) < leastLeftS))) best = now;
+    if (most === Infinity || (now.flip < most && now.leftS > 0 && now.leftS >= leastLeftS)) best = now;
   }
   return best;
 }
@@ -129,7 +128,7 @@ export function* choiceInTime(data: PackageData,
   const loss = new TextureLoss(data, request.displayedPx);
   const best = yield* betterScale(loss, request, wanted, only ? wanted + 1 : Infinity);
   // Where textures are not all that is off.
-  return !only && best?.scale === wanted && !best.late && best.textureFlip < finerPays * best.flip
+  return !only && best?.scale === wanted && best.leftS > 0 && best.textureFlip < finerPays * best.flip
     ? yield* betterScale(loss, request, finest, wanted, best) : best;
 }
 
