@@ -4,7 +4,7 @@ import { pow } from './portable_math';
 import { beyondStart, proxyBytesBeyondStart, proxyLoss } from './proxy_choice';
 
 // Which larger proxy is shown on the way from the smallest one to a scale, from the numbers of the manifest
-// alone: format/rules/proxy_choice.cpp, bit for bit.
+// alone: format/rules/proxy_choice.cpp, bit for bit, but for what comes ahead of another proxy.
 
 /** A link as the first request has shown it, and the seconds that are left until the time limit. */
 export interface StepLink {

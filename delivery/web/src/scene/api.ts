@@ -158,7 +158,7 @@ export interface LoadEvents {
   request: RequestRecord & { at: number };
   /** The smallest proxy (`scale` is -1), or the coarsest mesh with its previews (`proxy` is -1), is shown. */
   'first-picture': { at: number; scale: number; proxy: number; bytes: number };
-  /** A proxy stands in the scene: the first one, a larger one on the way to scales, or one that is enough. */
+  /** A proxy stands in the scene: the first one, a larger one on the way, or one that is enough. */
   proxy: { at: number; proxy: number; triangles: number };
   /** Another scale stands in the scene. */
   scale: { at: number; scale: number; triangles: number };

@@ -5,7 +5,7 @@ import type * as Printed from '../decide/thesis_list';
 import { throwIfAborted } from '../format/errors';
 import { nowS } from '../http/requests';
 import { type FragmentFetch, upgradeWishes } from './fragment_fetch';
-import type { LoadContext } from './load_context';
+import { type LoadContext, mostLate } from './load_context';
 import type { Transfers, Wish } from './transfers';
 
 /** Those who hear of the plan's course. */
@@ -64,8 +64,6 @@ export async function playPlan(plan: HarmonicTimePlan, { groups }: GroupedList, 
 
 /** Decoding and uploading after the last byte: 4 ms, or 11 without a GPU, were measured. */
 export const composeS = 0.015;
-/** Fragments that are later than this share of the limit are given up. */
-const mostLate = 0.01;
 /** A rest of less than this share of the limit, a round trip taken off, is not worth another request. */
 const leastRest = 0.004;
 /** Share of the bytes promised by the throughput that a request may count on. */
@@ -145,7 +143,8 @@ export class FetchInTime {
   }
   /** Upgrades take the rest of the time, in ever smaller requests: rungs do not fit a plan to the byte. */
   async spendRest(list: FragmentList): Promise<void> {
-    const { plan_: plan, load_: { limitS, signal, reader: { client } } } = this;
+    const { plan_: plan, load_: load } = this;
+    const { limitS, reader: { client } } = load;
     if (!plan || !this.hasPlan) return;
     for (;;) {
       const restS = this.leftS() - composeS;
@@ -155,9 +154,7 @@ export class FetchInTime {
       const most = 2 * client.options.connections;
       const wishes = upgradeWishes(list, certain * plan.throughputBytesS() * afterS, this.fetching_).slice(0,
         most);
-      const late = AbortSignal.timeout(Math.ceil(1000 * (restS + mostLate * limitS)));
-      if (wishes.length === 0 ||
-          (await this.fetching_.fetch(wishes, AbortSignal.any?.([late, signal]) ?? late)) === 0) return;
+      if (wishes.length === 0 || (await this.fetching_.fetch(wishes, load.untilLimit())) === 0) return;
     }
   }
 }

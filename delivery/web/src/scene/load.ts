@@ -71,7 +71,7 @@ export class ProxyOnTheWay {
     const { load_: load, proxy_: proxy } = this;
     const part = this.free_ && load.options.policy !== 'thesis' ? await this.part_ : undefined;
     const step = part ? part.stepOf(load) : -1;
-    const bytes = step > Math.max(proxy.shown, 0) ? proxy.fetch(step) : undefined;
+    const bytes = step > Math.max(proxy.shown, 0) ? proxy.fetch(step, load.untilLimit()) : undefined;
     const rest = (bytes ?? Promise.resolve()).then(this.fetchRest_, this.fetchRest_);
     rest.catch(() => undefined); // whoever waits hears of it
     return { step, bytes, rest };
@@ -314,7 +314,8 @@ class ModelLoad {
   }
   private follow_(always = this.context.options.autoRefine ?? true): void {
     if (!this.textures) return void this.followByProxies_();
-    void this.scale_.follow();
+    // Behind a proxy nobody sees a scale before refining.
+    if (always || !this.scale_.held) void this.scale_.follow();
     if (always) void this.refine();
   }
   /** Where a proxy was enough: a larger one, or from now on scales. */

@@ -1,4 +1,5 @@
 import { type Camera, Group, Vector2 } from 'three';
+import { clamp } from '../decide/numbers';
 import { InputError, abortError, isAbort, throwIfAborted } from '../format/errors';
 import { nowS } from '../http/requests';
 import type { PackageReader } from '../http/package_reader';
@@ -13,6 +14,8 @@ import { MaterialSet } from './scale_parts';
 export const hysteresis = 1.1;
 /** A longer time limit counts as none: timers and plans end there. */
 const longestS = 1e5;
+/** What is later than this share of the limit is given up. */
+export const mostLate = 0.01;
 /** Displayed height where nobody says one, device px. */
 const defaultHeightPx = 1000;
 
@@ -70,6 +73,12 @@ export class LoadContext {
     return nowS() - this.startS_;
   }
 
+  /** Ends what the timed part waits for, a little behind the limit, and at the end of the load. */
+  untilLimit(): AbortSignal {
+    const leftS = this.limitS * (1 + mostLate) - this.elapsedS();
+    const late = AbortSignal.timeout(Math.ceil(1000 * clamp(leftS, 0, longestS)));
+    return AbortSignal.any?.([late, this.signal]) ?? late;
+  }
   /** The timed part begins when whoever gives turns says so; `bytes` of it are fetched however long it is. */
   async turn(bytes: number): Promise<void> {
     const { options: { turn }, signal } = this;

@@ -125,6 +125,7 @@ export class ShownPlanes {
     });
   }
   private withinMemory_(choices: readonly PlaneChoice[], scale: number): readonly PlaneChoice[] {
+    if (choices.length === 0) return choices; // which say nothing of how texels fit
     const room = this.room_(scale);
     this.way_ ??= wayWithin(choices, room, this.ways);
     if (room === Infinity) return choices;

@@ -23,8 +23,8 @@ export class ShownProxy {
     return [this.object_, this.coming_].filter((object) => object !== undefined);
   }
   /** The bytes of a proxy. */
-  fetch(proxy: number): Promise<Uint8Array> {
-    const { reader, signal } = this.load_;
+  fetch(proxy: number, signal = this.load_.signal): Promise<Uint8Array> {
+    const { reader } = this.load_;
     return reader.proxyGlb(proxy, { signal });
   }
   /** Puts a proxy in place of the one before, in one turn of the page, once its bytes are there. */

@@ -19,6 +19,8 @@ export class ShownScale {
   readonly proxy: ShownProxy;
   /** The scale that is enough at a displayed height, or the finest; set once the documents are there. */
   scaleFor?: (heightPx: number, part: VisiblePart | undefined, finest?: boolean) => number;
+  /** Hears that a scale is there behind the proxy. */
+  behind?: () => void;
   private retryScale_ = noScale;
   private retryTimer_: ReturnType<typeof setTimeout> | undefined;
   private retryS_ = retryScaleS.first;
@@ -78,7 +80,8 @@ export class ShownScale {
   private show_(scale: number): void {
     throwIfAborted(this.load_.signal);
     this.shown = scale;
-    if (!this.held) this.place_();
+    if (this.held) this.behind?.();
+    else this.place_();
   }
   private place_(): void {
     const { shown, load_: { object, reader } } = this;

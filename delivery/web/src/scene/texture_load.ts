@@ -60,6 +60,8 @@ const unseen = 1e-3;
  * to .8 s for 4 million texels.
  */
 const showShare = 0.6;
+/** Scale and planes are chosen anew where less than this share of the time that they were chosen for is left. */
+const sameTime = 0.8;
 /** 1 - SSIM at which refining ends by default. */
 const defaultRefineTo = 0.003;
 /** Refining ends where so many rounds have brought nothing. */
@@ -82,6 +84,7 @@ export class TextureLoad {
   private had_?: PlaneComposer[]; // what the GPU has lost and is being made anew
   private restores_ = 0;
   private finer_ = Promise.resolve(); // the mesh that refining ends with
+  private readonly lostProxies_ = new Set<number>();
   private fruitlessRounds_ = 0; // rounds of refining that brought nothing, one after the other
 
   constructor(private readonly load_: LoadContext, private readonly scale_: ShownScale,
@@ -89,6 +92,7 @@ export class TextureLoad {
     this.planes_ = fetching_.planes;
     this.inTime_ = new FetchInTime(load_, fetching_);
     scale_.scaleFor = (...of) => this.scaleFor_(...of);
+    scale_.behind = () => this.releaseIfBetter_();
     if (scale_.held) load_.events.on('fragment', () => this.releaseInTime_());
   }
 
@@ -124,9 +128,15 @@ export class TextureLoad {
     if (options.policy === 'thesis') this.inTime_.printed = await import('../decide/thesis_list');
     if (options.jnd !== undefined)
       this.alike_ = await (await import('../decide/thesis_list')).coarsestAlike(load);
-    const { scale, planes: chosen, flip } = await this.choice_();
-    // Behind a proxy that looks better than scales do in the time, the rest is refining.
-    if (flip !== undefined && (await this.showBetterProxies_(flip))) return this.endTimed_();
+    let choice = await this.choice_();
+    while (choice.flip !== undefined) {
+      const leftS = this.inTime_.leftS();
+      // Behind a proxy that looks better than scales do in the time, the rest is refining.
+      if (await this.showBetterProxies_(choice.flip)) return this.endTimed_();
+      if (this.inTime_.leftS() > sameTime * leftS) break;
+      choice = await this.choice_();
+    }
+    const { scale, planes: chosen } = choice;
     if (scale !== this.scale_.shown) load.enter('mesh');
     const meshBytes = this.source_.bytesOf(scale);
     const mesh = this.scale_.load(scale);
@@ -154,21 +164,26 @@ export class TextureLoad {
     const { load_: load } = this;
     load.emit('deadline', { limit: load.limitS, actual: load.elapsedS(), skipped });
   }
-  /** Shows larger proxies where scales look worse in the time. False: what is shown is no better. */
+  /** Shows larger proxies where scales look worse in the time. True: that was the time. */
   private async showBetterProxies_(flip: number): Promise<boolean> {
-    const { scale_: { proxy, held }, load_: load, inTime_: inTime } = this;
+    const { scale_, load_: load, inTime_: inTime, lostProxies_: lost } = this;
     const { beta0, reader: { manifest, client }, view: { display: { heightPx } } } = load;
-    const better = { flip: flip - worthwhileFlip, fits: (k: number): boolean => fits(load, k) };
+    const { proxy } = scale_;
+    const better = { flip: flip - worthwhileFlip, fits: (k: number) => fits(load, k) && !lost.has(k) };
     // A link that slows down a little makes none late.
     const link = { bytesS: certain * beta0, rttS: client.latencyS };
+    const isFree = (): boolean => scale_.held && load.override.scale === undefined && !inTime.printed;
     const next = (): number =>
       proxyAhead(manifest, proxy.shown, heightPx, { ...link, leftS: inTime.leftS() }, better);
-    try {
-      for (let k; held && (k = next()) >= 0; ) await proxy.show(k);
-    } catch (error) {
-      load.fail(error, 'proxy'); // the smaller one stays
-    }
-    return held && proxyLoss(manifest, proxy.shown, heightPx).flip < better.flip;
+    for (let k; isFree() && (k = next()) >= 0; )
+      try {
+        await proxy.show(k, proxy.fetch(k, load.untilLimit()));
+      } catch (error) {
+        throwIfAborted(load.signal);
+        lost.add(k); // the smaller one stays
+        if (inTime.leftS() > 0) load.fail(error, 'proxy');
+      }
+    return isFree() && (inTime.leftS() <= 0 || proxyLoss(manifest, proxy.shown, heightPx).flip < better.flip);
   }
   /** Shows the previews of these planes beside a scale. The second promise is that the scene has changed. */
   private async showPlanes_(chosen: readonly PlaneChoice[],
@@ -184,12 +199,13 @@ export class TextureLoad {
   /** The scale takes the proxy's place once the scale is predicted to look better. */
   private releaseIfBetter_(): void {
     const { list_: list, scale_: scale, planes_: planes,
-      load_: { view: { display: { heightPx } }, reader: { manifest } } } = this;
+      load_: { override, view: { display: { heightPx } }, reader: { manifest } } } = this;
     if (!list || !scale.held || scale.shown < 0) return;
     this.lookedS_ = nowS();
     const losses = lossesOf(list, list.fragments.map((f) => planes.rungOf(f)));
     const flip = pictureFlip(planes.data.quality, heightPx, scale.shown, losses);
-    if (flip <= proxyLoss(manifest, scale.proxy.shown, heightPx).flip) scale.release();
+    if (override.scale === scale.shown || flip <= proxyLoss(manifest, scale.proxy.shown, heightPx).flip)
+      scale.release();
   }
   private releaseInTime_(): void {
     if (this.scale_.held && nowS() > this.lookedS_ + lookEachS) this.releaseIfBetter_();
@@ -287,7 +303,10 @@ export class TextureLoad {
     const { planes_: planes, scale_: { wanted } } = this;
     this.fetching_.fates.allowLostAgain();
     // Behind a proxy that took the whole time.
-    if (planes.all().length === 0) await (await this.showPlanes_(planes.forDisplay(), wanted)).shown;
+    if (planes.all().length === 0) {
+      await planes.considerCompression(wanted);
+      await (await this.showPlanes_(planes.forDisplay(), wanted)).shown;
+    }
     await this.showFinerPlanes_();
     while (!again() && (await this.refineSome_()));
     if (!again()) await this.fetching_.composed();

@@ -3,6 +3,7 @@ import { type BufferGeometry, type EventDispatcher, type Material, type Mesh, Pe
 import { describe, expect, it } from 'vitest';
 import { scaleBytes, textureBytes } from '../../src/decide/gpu_size';
 import { selectScale, stepFunction } from '../../src/decide/viewing';
+import { leastTrianglePx2 } from '../../src/format/shared_numbers';
 import { InputError, PackageReader } from '../../src/reader';
 import { fakeServer } from '../support/fake_server';
 import { golden } from '../support/files';
@@ -110,7 +111,8 @@ describe('a load', () => {
     const l = await loading(url, fakeServer(files), { time: 3, autoRefine: false, display: () => px });
     await l.model.done;
     expect(l.model.state.wantedScale).toBe(0);
-    for (const [now, shown] of [[Math.sqrt(scales[0].triangles), 0], [1, scale]]) {
+    const leastPx = Math.sqrt(leastTrianglePx2 * scales[0].triangles);
+    for (const [now, shown] of [[leastPx + 0.01, 0], [leastPx - 1, scale]]) {
       px = now;
       l.model.update();
       expect(l.model.state.wantedScale).toBe(shown);

@@ -1,6 +1,8 @@
-import { expect, it } from 'vitest';
-import { fakeServer } from '../support/fake_server';
-import { loading, until } from '../support/loading';
+import { describe, expect, it } from 'vitest';
+import { type Fault, fakeServer } from '../support/fake_server';
+import { golden } from '../support/files';
+import { type Loading, loading, until } from '../support/loading';
+import type { LoadOptions } from '../../src/scene/api';
 import { files, url } from '../support/scan';
 
 it('who gives up an override in the timed part does not ask for everything', async () => {
@@ -30,4 +32,71 @@ it('planes with more texels take the time that is left where all that was chosen
   expect(Math.max(...at('fragment'))).toBeGreaterThan(Math.max(...at('plane')));
   expect(l.count('error')).toBe(0);
   l.dispose();
+});
+
+describe('a proxy that looks better than scales do in the time', () => {
+  /** 30 kB/s; the proxies are as far from S_0 as `flips` say. Of equal ones none comes on the way to scales. */
+  const [onTheWay, ahead] = [[0.24, 0.005], [0.0051, 0.005]];
+  const load = (flips: number[], fault?: Fault, options: Partial<LoadOptions> = {}): Promise<Loading> =>
+    loading('http://t/p.texmesh', fakeServer({ '/p.texmesh': golden('v2.0-proxies') }, { fault }),
+      { time: 0.8, beta0BytesS: 30e3, display: 500, autoRefine: false, ...options }, {}, ({ manifest }) =>
+        manifest.proxies.forEach(({ flip }, k) => flip.fill(flips[k])));
+  /** Proxy, scale and number of textures. */
+  const shown = ({ model: { state } }: Loading): number[] => [state.proxy, state.scale, state.planes.length];
+  const larger = ({ range }: Parameters<Fault>[0]): boolean => range?.[0] === 20864;
+  const finest = ({ range }: Parameters<Fault>[0]): boolean => range?.[0] === 75328;
+  it.each([onTheWay, ahead])('of %d and %d ends the timed part; refining goes on to scales',
+      async (...flips) => {
+    const l = await load(flips);
+    await l.model.done;
+    expect(shown(l)).toEqual([1, -1, 0]);
+    expect([l.count('deadline'), l.count('decision')]).toEqual([1, 0]);
+    await l.model.refine();
+    expect(shown(l)).toEqual([-1, 0, 1]);
+    expect(l.count('error')).toBe(0);
+    l.dispose();
+  });
+  it('gives way to a mesh that comes behind the last fragment', async () => {
+    let times = 0;
+    const l = await load(ahead, (request) => finest(request) && ++times === 1 && 'status-404');
+    await l.model.done;
+    await l.model.refine();
+    expect(shown(l)).toEqual([1, -1, 1]);
+    expect(await until(() => l.model.state.scale === 0)).toBe(true); // asked for again
+    expect(l.model.state.proxy).toBe(-1);
+    l.dispose();
+  });
+  it.each([onTheWay, ahead])('of %d and %d that does not come leaves the smaller one at the limit',
+      async (...flips) => {
+    const l = await load(flips, (request) => larger(request) && 'stall');
+    const from = performance.now();
+    await l.model.done;
+    expect(performance.now() - from).toBeLessThan(2000);
+    expect(l.model.state.proxy).toBe(0);
+    expect(l.count('deadline')).toBe(1);
+    l.dispose();
+  });
+  it('that cannot be had leaves the time to scales', async () => {
+    const l = await load(onTheWay, (request) => larger(request) && 'status-404');
+    await l.model.done;
+    expect(l.count('decision')).toBeGreaterThan(0);
+    expect(l.model.state.proxy).toBe(-1);
+    l.dispose();
+  });
+  it('shows nothing any more when it is cancelled on its way', async () => {
+    const l = await load(ahead, (request) => larger(request) && 'stall');
+    expect(await until(() => l.count('proxy') > 0)).toBe(true);
+    setTimeout(() => l.model.cancel(), 100);
+    await expect(l.model.done).rejects.toThrow();
+    expect(l.model.state.phase).toBe('cancelled');
+    expect(l.count('deadline')).toBe(0);
+    l.dispose();
+  });
+  it('is not for policy thesis, nor where scales look better', async () => {
+    for (const l of [await load(ahead, undefined, { policy: 'thesis' }), await load([0.24, 0.2])]) {
+      await l.model.done;
+      expect(l.count('decision')).toBeGreaterThan(0);
+      l.dispose();
+    }
+  });
 });

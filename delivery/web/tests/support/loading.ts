@@ -71,11 +71,12 @@ export interface Loading {
   dispose(): void;
 }
 
-/** Opens and loads a package of a fake server. */
+/** Opens and loads a package of a fake server; `opened` may change what its manifest says. */
 export async function loading(url: string, server: FakeServer, load: Partial<LoadOptions> = {},
-    open: OpenOptions = {}): Promise<Loading> {
+    open: OpenOptions = {}, opened: (pkg: TexmeshPackage) => void = () => undefined): Promise<Loading> {
   const pkg = await TexmeshPackage.openUrl(url,
     { fetch: server.fetch, startBytes: 16384, retries: 0, retryDelayS: 0.001, ...open });
+  opened(pkg);
   const uploads: Uploads = [];
   const model = pkg.load(new Scene(), {
     renderer: fakeRenderer(uploads),
@@ -83,7 +84,7 @@ export async function loading(url: string, server: FakeServer, load: Partial<Loa
     decode: decodeNothing, meshes: 'glb', time: Infinity, display: 4000, ...load,
   });
   const events: Loading['events'] = [];
-  const names: (keyof LoadEvents)[] = ['request', 'first-picture', 'scale', 'plane', 'fragment', 'decision',
+  const names: (keyof LoadEvents)[] = ['request', 'first-picture', 'proxy', 'scale', 'plane', 'fragment', 'decision',
     'deadline', 'error', 'done'];
   for (const name of names)
     model.on(name, (event) => events.push({ name, event } as Loading['events'][number]));
