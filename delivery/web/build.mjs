@@ -73,7 +73,7 @@ async function viewer(write) {
     for (const { path, contents } of outputFiles) writeFileSync(path, contents);
     for (const file of ['worker.js', 'blocks.js']) copyFileSync(join(dist, file), join(to, file));
     const three = dirname(dirname(createRequire(import.meta.url).resolve('three')));
-    for (const file of ['draco_decoder.wasm', 'draco_wasm_wrapper.js']) copyFileSync(join(three, 'examples/jsm/libs/draco/gltf', file), join(to, 'draco', file));
+    for (const file of ['draco_decoder.wasm', 'draco_wasm_wrapper.js', 'draco_decoder.js']) copyFileSync(join(three, 'examples/jsm/libs/draco/gltf', file), join(to, 'draco', file));
   }
   return { outputFiles, metafile };
 }

@@ -42,7 +42,8 @@ test('hosts: zoom and other screens: the canvas has the pixels of the device', (
 }));
 
 // Nothing in the text of a page, as strict sites have it; README names what the decoders need.
-const kPolicy = "default-src 'none'; script-src 'self' 'wasm-unsafe-eval'; style-src 'self'; worker-src 'self' blob:; connect-src 'self' blob:; img-src 'self' blob: data:";
+const kPolicy = "default-src 'none'; script-src 'self' 'wasm-unsafe-eval'; style-src 'self'; worker-src 'self' blob:; connect-src 'self'; img-src data:; " +
+  "require-trusted-types-for 'script'; trusted-types texmesh";
 test('hosts: under the policy that README names the element looks and works as ever', () => onPage(one('camera-controls').replace(/<style>.*<\/style>/s, ''), async (page) => {
   const m = await becomes(page, complete, 'under a policy');
   check(m.canvas.join() === '300,300', `a canvas of ${m.canvas}: the element's own style is missing`);
@@ -51,17 +52,29 @@ test('hosts: under the policy that README names the element looks and works as e
   check(await covered(page, 0, 'hosts-policy') > 0.02, 'nothing is seen');
 }, {policy: kPolicy}));
 
+test('hosts: without WebAssembly the meshes have a decoder, too', () => onPage(one(), async (page) => {
+  await becomes(page, complete, 'without WebAssembly');
+  page.said = page.said.filter((s) => !kBrowsers.test(s));
+}, {policy: kPolicy.replace(" 'wasm-unsafe-eval'", '').replace("style-src 'self'", "style-src 'unsafe-inline'")}));
+
+test('hosts: a host that compresses whatever is asked for is asked for the whole package', () => onPage(one(), async (page, server) => {
+  const told = [];
+  page.on('console', (m) => m.type() === 'info' && told.push(m.text()));
+  await becomes(page, complete, 'compressed');
+  check(server.requests.filter((r) => r.path.endsWith('maps.texmesh')).length < 10, 'it is asked again and again');
+  await page.waitForTimeout(200);
+  check(told.some((t) => /Content-Encoding/.test(t)), told.join('\n'));
+  page.said = page.said.filter((s) => !kBrowsers.test(s));
+}, {fault: (r) => r.path.endsWith('maps.texmesh') && {gzip: true}}));
+
 test('hosts: where a policy forbids decoders, a sentence says that nothing comes, and the console why', () => onPage(one(), async (page) => {
   const told = [];
   page.on('console', (m) => m.type() === 'info' && told.push(m.text()));
-  await becomes(page, failed, 'without decoders', 20);
+  await becomes(page, failed, 'without decoders', 10);
   await page.waitForTimeout(200);
-  check(told.some((t) => /Content-Security-Policy.*wasm-unsafe-eval/.test(t)), told.join('\n'));
+  check(told.some((t) => /Content-Security-Policy.*must have worker-src blob:\./.test(t)), told.join('\n'));
   page.said = page.said.filter((s) => !kBrowsers.test(s) && !/the decoder of meshes gives no answer/.test(s));
-}, {
-  policy: "script-src 'self'; style-src 'self' 'unsafe-inline'",
-  before: () => { const set = window.setTimeout; window.setTimeout = (f, ms, ...rest) => set(f, ms === 30000 ? 3000 : ms, ...rest); },
-}));
+}, {policy: "script-src 'self'; style-src 'self' 'unsafe-inline'"}));
 
 test('hosts: a script of another host has its workers, too', async () => {
   const other = await serve(kElement);

@@ -22,7 +22,7 @@ function requestedRange(header, size) {
 /**
  * Serves the folders of `roots` ({'/prefix/': folder}) on loopback. Every request is kept in `requests` as {method, path, range,
  * status, bytes}; `fault(request)` may return what goes wrong with one: {status}, {flip: byte of the body}, {cut: bytes after which
- * the connection ends}, {stall: bytes after which nothing more comes}, {delay: ms}. `policy`: the pages' Content-Security-Policy. `gzip`: scripts and
+ * the connection ends}, {stall: bytes after which nothing more comes}, {delay: ms}, {gzip: true}: compressed, also parts. `policy`: the pages' Content-Security-Policy. `gzip`: scripts and
  * pages are packed, as most servers pack them.
  */
 export async function serve(roots, {ranges = true, fault = () => undefined, cors = true, policy = '', gzip = false} = {}) {
@@ -80,7 +80,7 @@ export async function serve(roots, {ranges = true, fault = () => undefined, cors
       // Pages and decoders are kept as everywhere; packages are not, so that every load shows on the line.
       'Cache-Control': /packages|figures|data/.test(url) ? 'no-store' : 'max-age=600',
     });
-    if (gzip && !range && /\.(js|mjs|html|css|wasm)$/.test(url)) {
+    if (wrong.gzip || (gzip && !range && /\.(js|mjs|html|css|wasm)$/.test(url))) {
       body = zlib.gzipSync(body);
       Object.assign(headers, {'Content-Encoding': 'gzip', 'Content-Length': body.length});
     }

@@ -157,12 +157,26 @@ int look(void* user, curl_off_t, curl_off_t received, curl_off_t, curl_off_t) {
   return 1;
 }
 
+/// As browsers send it: people paste addresses with spaces and letters of their own.
+std::string sent_url(const std::string& url) {
+  std::string out;
+  for (const char c : url) {
+    constexpr const char* kHex = "0123456789ABCDEF";
+    const auto byte = static_cast<unsigned char>(c);
+    if (byte > ' ' && byte < 127)
+      out += c;
+    else
+      (out += '%').append({kHex[byte >> 4], kHex[byte & 15]});
+  }
+  return out;
+}
+
 /// Sets the handle up for a GET; the headers belong to the caller and must live as long as the transfer.
 curl_slist* prepare(Transfer& transfer, const std::string& url) {
   CURL* h = transfer.handle;
   const HttpOptions& options = *transfer.options;
   const std::optional<HttpRange>& range = transfer.range;
-  ::curl_easy_setopt(h, CURLOPT_URL, url.c_str());
+  ::curl_easy_setopt(h, CURLOPT_URL, sent_url(url).c_str());
   ::curl_easy_setopt(h, CURLOPT_PROTOCOLS_STR, "http,https");
   ::curl_easy_setopt(h, CURLOPT_REDIR_PROTOCOLS_STR, "http,https");
   ::curl_easy_setopt(h, CURLOPT_FOLLOWLOCATION, 1L);

@@ -185,11 +185,27 @@ class HttpSource final : public ByteSource {
           }
         start(ended->number, piece);
       }
+      require_same_start();
     } catch (...) {
       store_all();
       throw;
     }
     store_all();
+  }
+  /// After another ETag: servers behind one name may each have their own. Throws, and keeps nothing, where
+  /// the package begins with other bytes now.
+  void require_same_start() {
+    if (other_etag_.empty() || same_start_) return;
+    same_start_ = true;
+    Piece now{0, std::min(known_from(0).first, kBootstrapBytes), {}, HttpRetries(pool_->options())};
+    start(0, now);
+    while (auto ended = pool_->wait(kRequestWait_s)) {
+      if (accept(now, ended->answer)) break;
+      start(0, now);
+    }
+    if (now.got == copy(0, now.bytes)) return;
+    same_start_ = false;
+    fail_replaced("ETag " + other_etag_);
   }
   void start(std::size_t number, const Piece& p) {
     const std::uint64_t bytes = p.bytes - p.got.size();
@@ -217,6 +233,7 @@ class HttpSource final : public ByteSource {
     if (at_ + 1 < urls_.size() && a.problem != "cancelled") {
       ++at_;
       etag_.clear();
+      other_etag_.clear();
       p.retries.emplace(pool_->options());
       return false;
     }
@@ -247,7 +264,7 @@ class HttpSource final : public ByteSource {
       throw FormatError(name(), place, "a Content-Range", "none that can be read: " + describe_answer(a));
     const std::uint64_t total = a.total ? *a.total : *total_;  // the first answer has it
     if (total_ && total != *total_) fail_replaced(std::to_string(total) + " bytes");
-    if (total_ && !is_same_file(a, etag_, *total_)) fail_replaced("ETag " + a.etag);
+    if (!a.etag.empty() && !etag_.empty() && a.etag != etag_) other_etag_ = a.etag;
     if (*a.first != offset || *a.last >= std::min(offset + bytes, total))
       throw FormatError(name(), place, "the range that was asked for",
                         std::to_string(*a.first) + "-" + std::to_string(*a.last));
@@ -259,7 +276,8 @@ class HttpSource final : public ByteSource {
   std::size_t at_ = 0;  // the server that is asked
   std::shared_ptr<HttpPool> pool_;
   std::optional<std::uint64_t> total_;
-  std::string etag_;                      // of the server that is asked
+  std::string etag_, other_etag_;         // of the server that is asked; one that an answer had later
+  bool same_start_ = false;               // and the package began as before then
   std::map<std::uint64_t, Bytes> parts_;  // by offset, not overlapping
 };
 

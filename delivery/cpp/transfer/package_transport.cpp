@@ -205,9 +205,8 @@ class HttpTransport final : public Transport {
     return false;
   }
   static bool is_another(Mirror& mirror, const HttpAnswer& a) {
-    if (!is_same_file(a, mirror.etag, mirror.total) ||
-        (mirror.total > 0 && a.total && mirror.total != *a.total))
-      return true;
+    // Another ETag alone is no proof: servers behind one name may each have their own. Digests tell.
+    if (!is_same_file(a, a.total ? "" : mirror.etag, mirror.total)) return true;
     if (a.total) mirror.total = *a.total;
     if (mirror.etag.empty()) mirror.etag = a.etag;
     return false;

@@ -304,7 +304,10 @@ TEST(TextureLoader, APackageThatWasReplacedIsSaidToBe) {
     RawServer server([&](const Request& r) {
       const std::string etag = replaced ? "\"two\"" : "\"one\"";
       if (whole && replaced) return Reply{answer(200, "ETag: " + etag + "\r\n", "new")};
-      return Reply{ranged(package_bytes(), r, "ETag: " + etag + "\r\n")};
+      std::string bytes = package_bytes();
+      if (replaced)
+        for (char& c : bytes) c ^= 1;
+      return Reply{ranged(bytes, r, "ETag: " + etag + "\r\n")};
     });
     const std::string url = server.url("/a.texmesh");
     PackageReader package(open_url(url, quick()));
@@ -317,9 +320,10 @@ TEST(TextureLoader, APackageThatWasReplacedIsSaidToBe) {
     const LoadReport r = loader.load(full_size(package), o);
     EXPECT_GT(r.given_up, 0u);
     bool said = false;
-    for (const auto& [why, count] : r.problems) said = said || why.find("replaced") != std::string::npos;
+    for (const auto& [why, count] : r.problems)
+      said = said || why.find(whole ? "replaced" : "another digest") != std::string::npos;
     EXPECT_TRUE(said);
-    EXPECT_LT(server.requests().size(), 12u);  // and no more is asked
+    EXPECT_LT(server.requests().size(), whole ? 12u : 48u);  // an ETag alone proves nothing
   }
 }
 

@@ -17,11 +17,30 @@ export function slowHostNote(form: string, compressed: boolean, url: string): st
   return origin + whole + (compressed ? (whole && ' The host also') + packed : '');
 }
 
-/** What most often causes an error, '' where nobody knows; `page`, `url`: addresses of page and package. */
-export function causeOf(error: unknown, url: string, page: string): string {
-  if (/decoder of meshes/.test(String(error)))
-    return "The page's Content-Security-Policy may forbid decoders: they need script-src " +
-      "'wasm-unsafe-eval', and blob: in worker-src, connect-src and img-src.";
+/** Sources by what browsers call what a policy has forbidden. */
+const sources: Record<string, string> = { blob: 'blob:', 'wasm-eval': "'wasm-unsafe-eval'",
+  'trusted-types-policy': 'texmesh', 'trusted-types-sink': 'texmesh' };
+/** What a policy must allow; '' where it has forbidden nothing that matters. */
+function policyNote(url: string, forbidden: Iterable<string>): string {
+  const { origin } = new URL(url);
+  const lacking = [...forbidden].map((what) => what.split(' ')).filter(([, blocked]) => blocked in sources ||
+    blocked.startsWith(origin));
+  // There is a decoder without WebAssembly.
+  const wanted = lacking.filter(([, blocked]) => lacking.length < 2 || blocked !== 'wasm-eval')
+    .map(([directive, blocked]) => `${directive.replace(/^require-(trusted-types)-for$/, '$1')} ` +
+      (sources[blocked] ?? origin));
+  return wanted.length > 0 ? "The page's Content-Security-Policy forbids what the object needs: it must " +
+    `have ${[...new Set(wanted)].join(', ')}.` : '';
+}
+
+/**
+ * What most often causes an error, '' where nobody knows; `page`, `url`: addresses of page and package;
+ * `forbidden`: what the page's policy has forbidden.
+ */
+export function causeOf(error: unknown, url: string, page: string, forbidden: Iterable<string> = []): string {
+  const note = policyNote(new URL(url, page).href, forbidden);
+  const isUnanswered = error instanceof InputError && !/status/.test(error.found);
+  if (note && (isUnanswered || !(error instanceof TexmeshError))) return note;
   if (!(error instanceof TexmeshError)) return '';
   const { found, rule } = error, status = Number(/status (\d+)/.exec(found)?.[1] ?? 0);
   if (status >= 400) return `The server's answer for ${url}: status ${status}.`;

@@ -2,6 +2,7 @@ import { startBytes } from '../format/layout';
 import { frame } from '../page/framing';
 import type { PageModel, ShowablePackage } from '../page/page_model';
 import { OrbitInput } from './orbit_input';
+import { forbidden, trusted } from './page_policy';
 import {
   bytesAt, degreesOf, linkBytesS, mostBytes, numberOf, offerInWords, orbitOf, savesData,
   sentenceOf, words, wordsFor,
@@ -101,7 +102,7 @@ export class TexmeshViewer extends HTMLElement {
     // A page whose policy forbids styles in its text (CSP) allows this one.
     (sheet ??= new CSSStyleSheet()).replaceSync(style);
     this.root_.adoptedStyleSheets = [sheet];
-    this.root_.innerHTML = template;
+    this.root_.innerHTML = trusted('createHTML', template);
     const part = (selector: string): HTMLElement => this.root_.querySelector(selector)!;
     this.parts_ = { canvas: part('canvas'), poster: part('.poster'), bar: part('.bar'),
       reveal: part('button.box'), error: part('div.box'), note: part('.note'), rights: part('.rights') };
@@ -276,7 +277,7 @@ export class TexmeshViewer extends HTMLElement {
     const { error, bar } = this.parts_;
     const said = this.words_, { src } = this;
     console.error(`<texmesh-viewer src="${src}">:`, problem);
-    void this.tellOwner_(({ causeOf }) => causeOf(problem, src, document.baseURI));
+    void this.tellOwner_(({ causeOf }) => causeOf(problem, src, document.baseURI, forbidden));
     // What fails before there is a model: the browser has no WebGL.
     const what = again ? sentenceOf(problem) : 'no3d';
     const button = Object.assign(document.createElement('button'),

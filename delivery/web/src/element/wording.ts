@@ -115,7 +115,8 @@ export const wordsFor = (language = ''): Words => words[language.toLowerCase().s
 
 /** The sentence that a visitor reads of an error. */
 export function sentenceOf(error: unknown): keyof Words {
-  if (!(error instanceof TexmeshError)) return /WebGL/.test(String(error)) ? 'no3d' : 'unreadable';
+  if (!(error instanceof TexmeshError))
+    return /WebGL|Worker is not/.test(String(error)) ? 'no3d' : 'unreadable';
   const { found, rule } = error, status = Number(/status (\d+)/.exec(found)?.[1] ?? 0);
   if (/status 4(?!08|29)/.test(found)) return 'missing';
   const page = status < 300 && (rule === 'K11' || /html/.test(found));

@@ -36,11 +36,28 @@ const cases: [string, unknown, string, keyof Words, RegExp][] = [
   ['another file', new FormatError(own, 'byte 9', 'the file that reading began with',
     'another ETag: it was replaced, open it anew'), own, 'unreadable', /several versions/],
   ['decoders that a page forbids', new Error('the decoder of meshes gives no answer'), own, 'unreadable',
-    /Content-Security-Policy.*wasm-unsafe-eval/],
+    /^$/],
+  ['no workers', new ReferenceError('Worker is not defined'), own, 'no3d', /^$/],
   ['no WebGL', new Error('Error creating WebGL context.'), own, 'no3d', /^$/],
   ['a mistake of ours', new TypeError('x is undefined'), own, 'unreadable', /^$/],
   ['no error at all', 'gone', own, 'unreadable', /^$/],
 ];
+it('what a policy forbids is named as it must be allowed', () => {
+  const late = new Error('the decoder of meshes gives no answer');
+  const unanswered = asked(foreign, 'Failed to fetch');
+  const host = 'https://files.example';
+  const told: [unknown, string[], string][] = [
+    [late, ['script-src wasm-eval'], "must have script-src 'wasm-unsafe-eval'."],
+    [late, ['script-src wasm-eval', 'worker-src blob', 'img-src data'], 'must have worker-src blob:.'],
+    [unanswered, [`connect-src ${foreign}`], `must have connect-src ${host}.`],
+    [unanswered, ['connect-src https://counter.example/x'], 'did not answer'],
+    [asked(foreign, 'status 404'), ['worker-src blob'], 'status 404'],
+    [late, ['require-trusted-types-for trusted-types-sink', 'trusted-types trusted-types-policy'],
+      'must have trusted-types texmesh.'],
+  ];
+  for (const [error, forbidden, words] of told)
+    expect(causeOf(error, foreign, page, forbidden)).toContain(words);
+});
 it.each(cases)('%s: visitors get a sentence, the console the rest', (_, error, url, sentence, details) => {
   expect(sentenceOf(error)).toBe(sentence);
   expect(causeOf(error, url, page)).toMatch(details);
