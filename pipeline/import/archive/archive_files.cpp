@@ -159,7 +159,8 @@ Bytes inflated(Bytes packed, std::uint64_t bytes) {
   return out;
 }
 
-constexpr std::size_t kMostSimilar = 16;  // in each of the two ways in which names are alike
+// Names below the folder, names of both kinds together, and names that are looked at for the second kind.
+constexpr std::size_t kMostBelow = 16, kMostSimilar = 32, kMostLooked = 64;
 constexpr std::uint64_t kMaxTextBytes = 65'536;
 
 /// The file of at most so many bytes that is least deep of those whose last part, in small letters, is
@@ -344,11 +345,12 @@ std::vector<std::string> ArchiveFiles::similar(const std::string& uri) {
   const std::string key = similar_key(uri), asked = folder_ + uri;
   const auto is_of_key = [&](const ArchivedFile& f) { return f.name != asked && key_below(f) == key; };
   if (const auto below = by_key_.find(key); below != by_key_.end())
-    for (std::size_t i = 0; i < below->second.size() && out.size() < kMostSimilar; ++i)
+    for (std::size_t i = 0; i < below->second.size() && out.size() < kMostBelow; ++i)
       if (const ArchivedFile& f = files_[below->second[i]]; is_of_key(f))
         out.push_back(f.name.substr(folder_.size()));
   if (const auto named = by_last_key_.find(similar_key(archived_name(uri))); named != by_last_key_.end())
-    for (std::size_t i = 0; i < named->second.size() && out.size() < 2 * kMostSimilar; ++i) {
+    for (std::size_t i = 0; i < std::min(named->second.size(), kMostLooked) && out.size() < kMostSimilar;
+         ++i) {
       const ArchivedFile& f = files_[named->second[i]];
       const std::string last = archived_name(f.name);
       if (!is_of_key(f)) out.push_back(by_last_[last].size() == 1 ? last : f.name);

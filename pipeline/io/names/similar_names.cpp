@@ -64,14 +64,14 @@ std::vector<std::string> FolderLists::entries_like(int folder, const std::string
   struct stat s {};
   Descriptor own(::openat(folder, ".", kListedFolder));
   if (own.get() < 0 || ::fstat(own.get(), &s) != 0) return {};
-  stamp = stamp_of(s);
   if (entries_ > kMostEntries) lists_.clear(), entries_ = 0;
   List& list = lists_[{s.st_dev, s.st_ino}];
-  if (list.stamp != stamp) {
-    list = {stamp, {}};
+  if (list.stamp != stamp_of(s)) {
+    list = {};
     const std::unique_ptr<DIR, int (*)(DIR*)> listing(::fdopendir(own.get()), ::closedir);
     if (!listing) return {};
     own.release();
+    list.stamp = stamp_of(s);
     for (std::size_t n = 0; n < kMostEntries; ++n, ++entries_) {
       const dirent* entry = ::readdir(listing.get());
       if (entry == nullptr) break;
@@ -79,6 +79,7 @@ std::vector<std::string> FolderLists::entries_like(int folder, const std::string
     }
     for (auto& [key, names] : list.by_key) std::sort(names.begin(), names.end());
   }
+  stamp = list.stamp;
   const auto found = list.by_key.find(similar_key(part));
   if (found == list.by_key.end()) return {};
   std::vector<std::string> like;

@@ -1,14 +1,16 @@
 import { concat } from '../format/sha256';
-import { FormatError, InputError } from '../format/errors';
+import { FormatError, InputError, throwIfAborted } from '../format/errors';
 import { bootstrapBytes } from '../format/layout';
 import { type ByteRange, manifestOfContainer } from '../format/manifest';
 import type { HttpClient } from './client';
 import { Asking, Mirror, Mirrors, retriesOf } from './mirrors';
-import { Answer, isSameFile, shownUrl, whatCame } from './requests';
+import { Answer, isSameFile, nowS, shownUrl, whatCame } from './requests';
 import type { PackageForm, PackageStore, Place, ReadOptions } from './store';
 
 /** A server may answer less than was asked for, but no fewer bytes. */
 const leastPart = 1024;
+/** Damaged bytes let the first ones be read again no more often, seconds. */
+const leastLookS = 10;
 
 /** Whether the page's own origin answers at a URL: other origins may keep headers to themselves (CORS). */
 function sameOrigin(url: string): boolean {
@@ -30,6 +32,7 @@ export class RangeStore implements PackageStore {
   /** The first request has had no answer. */
   unanswered = false;
   private start_ = new Uint8Array(0);
+  private looked_ = { s: -Infinity, found: Promise.resolve() };
   private tree_?: Promise<PackageStore>;
   private form_: PackageForm = 'range';
   private parts_: { begin: number; bytes: Uint8Array }[] = []; // the last read first
@@ -57,11 +60,11 @@ export class RangeStore implements PackageStore {
     try {
       return await this.readRange_(range, how);
     } catch (error) {
-      // Damaged bytes may be those of another package; else nobody knows.
-      if (error instanceof FormatError && how.verify && !/replaced/.test(error.found))
-        await this.requireStart_(this.mirrors_.all.find((m) => m.alive)!, 'other bytes').catch((now) => {
-          if (now instanceof FormatError) throw now;
-        });
+      // Damaged bytes may be those of another package.
+      if (error instanceof FormatError && how.verify && !/replaced/.test(error.found)) {
+        await this.look_();
+        throwIfAborted(how.signal);
+      }
       if (!(error instanceof RangesEnded) || !this.openTree_) throw error;
       this.tree_ ??= this.openTree_(manifestOfContainer(await this.manifest(), this.name), how.signal);
       this.tree_.then(() => (this.form_ = 'files'), () => (this.tree_ = undefined));
@@ -129,19 +132,21 @@ export class RangeStore implements PackageStore {
       if (m.total < 0 && (isNone || (offset === 0 && !isPart)))
         throw (this.noRanges = new InputError(shownUrl(m.url), '', 'a server that answers ranges',
           whatCame(a)));
-      if (a.status === 200 && isSameFile(a, m))
+      if (a.status === 200 && isSameFile(a, m.sameStart ? { ...m, etag: '' } : m))
         throw new RangesEnded(shownUrl(m.url), `byte ${offset}`, 'an answer with status 206',
           'status 200: ranges are no longer answered');
       if (isNone) this.requireSame_(m, false, offset, `status ${a.status}`);
       if (a.status === 206) {
         this.checkRange_(m, a, range);
-        if (offset > 0 && a.etag && a.etag !== m.etag)
-          try {
+        if (a.etag && a.etag !== m.etag) {
+          this.requireSame_(m, offset > 0 || have === 0, offset, 'another ETag');
+          if (offset > 0) try {
             await (m.sameStart ??= this.requireStart_(m, 'another ETag'));
           } catch (error) {
             m.sameStart = undefined;
             throw error;
           }
+        }
         chunks.push(a.body);
         have += a.body.length;
         if (a.complete) {
@@ -156,6 +161,16 @@ export class RangeStore implements PackageStore {
           whatCame(a));
       }
     }
+  }
+  /** Throws where the package is seen to be another one; asks only now and then. */
+  private look_(): Promise<void> {
+    if (nowS() < this.looked_.s + leastLookS) return this.looked_.found;
+    const found = this.requireStart_(this.mirrors_.all.find((m) => m.alive)!, 'other bytes')
+      .catch((now) => {
+        if (now instanceof FormatError) throw now;
+      });
+    this.looked_ = { s: nowS(), found };
+    return found;
   }
   /** Throws where the package begins with other bytes now. */
   private async requireStart_(m: Mirror, found: string): Promise<void> {

@@ -139,6 +139,22 @@ describe('trouble', () => {
     expect(await readSome(reader)).toBe(expected);
     expect(server.log.filter((r) => r.range![0] === 0).length).toBe(2);
   });
+  it('but the first answer is not completed by another file', async () => {
+    const server = range(({ number }) => (number === 0 ? 'cut' : number === 1 && 'other-etag'));
+    expect(await readSome(await openRetrying(server))).toBe(expected);
+    expect(server.log.slice(0, 3).map((r) => r.range![0])).toEqual([0, 8192, 0]);
+  });
+  it('a node with an ETag of its own that answers no ranges ends them', async () => {
+    const server = range(({ number }) => number > 0 && (number < 4 ? 'other-etag' : 'whole-other'));
+    const error = await rejection(openRetrying(server).then(readSome));
+    expect(error.message).toContain('ranges are no longer answered');
+  });
+  it('bytes that are damaged again and again let the first ones be read once more', async () => {
+    const server = range((request) => request.range![0] > 0 && 'flip');
+    const reader = await openRetrying(server);
+    for (const n of [0, 1, 2, 3]) await rejection(reader.scaleGlb(reader.manifest.scales[n % 2].scale));
+    expect(server.log.filter((r) => r.range![0] === 0).length).toBe(2);
+  });
   it('bytes of another package of the same length are told as such where no ETag tells', async () => {
     const { fetch } = range(({ number }) => number > 1 && 'other-file');
     const untold: typeof fetch = async (input, init) => {
