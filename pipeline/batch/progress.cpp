@@ -300,7 +300,7 @@ std::string Progress::recalled_text(std::ptrdiff_t recalled, std::size_t models)
 }
 
 void Progress::line(const std::string& text) {
-  out_ << (mode_ == OutputMode::kTerminal ? "\r\033[K" : "") << text << '\n' << std::flush;
+  out_ << (mode_ == OutputMode::kTerminal ? "\r\033[K" : "") << printable(text) << '\n' << std::flush;
 }
 
 double Progress::done_fraction() const {
@@ -322,7 +322,7 @@ std::string Progress::slowest() const {
   const auto it = std::min_element(running_.begin(), running_.end(), [](const auto& a, const auto& b) {
     return a.second.start < b.second.start;
   });
-  return it == running_.end() ? "" : std::string(models_[it->first].name) + " " + it->second.stage;
+  return it == running_.end() ? "" : printable(models_[it->first].name) + " " + it->second.stage;
 }
 
 /// Ten times a second is enough for an eye; events come faster.

@@ -127,7 +127,9 @@ class FetchedFiles {
   void write_entry(const std::string& path, const Bytes& bytes) {
     if (folder_.empty()) return;
     const std::filesystem::path file = std::filesystem::path(folder_) / path;
-    std::filesystem::create_directories(file.parent_path());
+    std::error_code failed;
+    std::filesystem::create_directories(file.parent_path(), failed);
+    if (failed) throw InputError(file.parent_path().string(), "", "", "cannot be made: " + failed.message());
     write_file_atomically(file.string(), bytes);
   }
 

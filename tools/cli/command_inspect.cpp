@@ -75,9 +75,10 @@ VerifyReport verify_path(const std::string& path, const RunContext& context) {
 }
 
 void print_verified(const std::string& path, const VerifyReport& r, bool quiet) {
-  for (const Finding& f : r.findings) std::cout << path << ": " << printable(to_string(f)) << '\n';
+  const std::string name = printable(path);
+  for (const Finding& f : r.findings) std::cout << name << ": " << printable(to_string(f)) << '\n';
   if (quiet && r.findings.empty()) return;
-  std::cout << path << ": " << (r.findings.empty() ? "ok" : counted(r.findings.size(), "finding")) << " ("
+  std::cout << name << ": " << (r.findings.empty() ? "ok" : counted(r.findings.size(), "finding")) << " ("
             << r.entries << " entries, " << grouped(r.bytes) << " bytes, " << r.meshes << " meshes, "
             << r.previews << " previews, " << r.fragments << " fragments"
             << (r.notes ? "; notes: " + notes_words(*r.notes) : "")

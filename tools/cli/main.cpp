@@ -2,6 +2,8 @@
 #include <fcntl.h>
 #include <unistd.h>
 
+#include <csignal>
+
 #include "format/container/layout.h"
 #include "pipeline/compile/options.h"
 #include "pipeline/compile/workers/worker.h"
@@ -62,6 +64,7 @@ void open_standard_files() {
 int main(int argc, char** argv) {
   using namespace texmesh;
   open_standard_files();
+  std::signal(SIGXFSZ, SIG_IGN);  // a limit on files (ulimit -f) is an error that can be told
   std::vector<char*> words(argv, argv + argc);
   static char help[] = "--help", version[] = "--version";
   if (argc > 1 && argv[1] == std::string("help")) words.erase(words.begin() + 1), words.push_back(help);

@@ -121,4 +121,22 @@ TEST_F(Names, AModelThatIsNotThereButForItsCaseIsNamed) {
       << r.output << r.errors;
 }
 
+TEST_F(Names, WhatATerminalTakesForCommandsIsNotPrinted) {
+  fs::rename(scans("a.obj"), scans("a\x1b[31m\nb.obj"));
+  const std::string said = compile(folder_ / "repository/scans");
+  EXPECT_NE(said.find("a?[31m?b"), std::string::npos) << said;
+  EXPECT_EQ(said.find('\x1b'), std::string::npos) << said;
+  const CommandResult missing = run_command({TEXMESH_BINARY, "dump", folder_ / "\x1b[2J.texmesh"});
+  EXPECT_NE(missing.errors.find("?[2J.texmesh"), std::string::npos) << missing.errors;
+}
+
+TEST_F(Names, ALimitOnFilesIsToldAsOne) {
+  compile(folder_ / "repository/scans");
+  const std::string package = folder_ / "out/a.texmesh";
+  const CommandResult r = run_command({"bash", "-c", "ulimit -f 1; exec \"$0\" unpack \"$1\" -o \"$2\"",
+                                       TEXMESH_BINARY, package, folder_ / "unpacked"});
+  EXPECT_EQ(r.exit_code, 1);
+  EXPECT_NE(r.errors.find("cannot be written: File too large"), std::string::npos) << r.errors;
+}
+
 }  // namespace texmesh::testing::command_compile_names_test

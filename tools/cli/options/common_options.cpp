@@ -11,6 +11,7 @@
 #include "pipeline/io/file_resolver.h"
 #include "pipeline/io/machine.h"
 #include "pipeline/io/names/closest_word.h"
+#include "pipeline/io/table.h"
 #include "tools/cli/options/command_line.h"
 
 namespace texmesh {
@@ -23,6 +24,16 @@ int with_all_printed(int exit_code) {
   if (std::cout) return exit_code;
   std::cerr << "texmesh: standard output cannot be written (is the disk full?)\n";
   return exit_code == kExitOk ? kExitModelFailed : exit_code;
+}
+
+/// Names of files may hold what a terminal takes for commands.
+int fail_with(const std::string& what, int exit_code) {
+  std::istringstream lines(what);
+  std::string text;
+  for (std::string line; std::getline(lines, line); text += printable(line) + '\n')
+    if (text.empty()) text = "texmesh: ";
+  std::cerr << text;
+  return exit_code;
 }
 
 /// Broken at blanks where it is wider than `width`; what follows stands `indent` to the right. A word that is
@@ -75,17 +86,13 @@ int run_and_print_errors(const std::function<int()>& run) {
   try {
     return with_all_printed(run());
   } catch (const UsageError& e) {
-    std::cerr << "texmesh: " << e.what() << '\n';
-    return kExitUsage;
+    return fail_with(e.what(), kExitUsage);
   } catch (const Error& e) {
-    std::cerr << "texmesh: " << e.what() << '\n';
-    return kExitModelFailed;
+    return fail_with(e.what(), kExitModelFailed);
   } catch (const std::filesystem::filesystem_error& e) {
-    std::cerr << "texmesh: " << e.what() << '\n';
-    return kExitModelFailed;
+    return fail_with(e.what(), kExitModelFailed);
   } catch (const std::exception& e) {
-    std::cerr << "texmesh: internal error: " << e.what() << '\n';
-    return kExitInternal;
+    return fail_with(std::string("internal error: ") + e.what(), kExitInternal);
   }
 }
 
