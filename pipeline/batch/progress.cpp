@@ -322,7 +322,7 @@ std::string Progress::slowest() const {
   const auto it = std::min_element(running_.begin(), running_.end(), [](const auto& a, const auto& b) {
     return a.second.start < b.second.start;
   });
-  return it == running_.end() ? "" : printable(models_[it->first].name) + " " + it->second.stage;
+  return it == running_.end() ? "" : printable(std::string(models_[it->first].name)) + " " + it->second.stage;
 }
 
 /// Ten times a second is enough for an eye; events come faster.
