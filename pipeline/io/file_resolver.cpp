@@ -4,6 +4,8 @@
 #include <linux/openat2.h>
 #include <sys/syscall.h>
 
+#include "pipeline/io/names/similar_names.h"
+
 namespace texmesh {
 namespace {
 
@@ -128,7 +130,9 @@ Bytes read_all(int fd, std::uint64_t max_bytes, const std::string& name, const s
 
 FileResolver::FileResolver(const std::filesystem::path& folder, std::vector<std::string> links_within,
                            Method method)
-    : roots_(std::move(links_within)), walk_(method == Method::kWalk) {
+    : roots_(std::move(links_within)),
+      walk_(method == Method::kWalk),
+      lists_(std::make_unique<FolderLists>()) {
   const std::string name = folder.empty() ? "." : folder.string();
   folder_ = ::open(name.c_str(), O_PATH | O_DIRECTORY | O_CLOEXEC);
   if (folder_ < 0) throw InputError(name, "", "the model's folder", message(errno));
@@ -243,7 +247,7 @@ std::optional<Bytes> FileResolver::read_beside(const std::string& name, std::uin
 }
 
 std::vector<std::string> FileResolver::similar(const std::string& uri) {
-  SimilarNames found = similar_names(roots_[0], uri, lists_);
+  SimilarNames found = similar_names(roots_[0], uri, *lists_);
   if (asked_similar_.insert(uri).second) requests_.push_back(found.request(uri));
   return std::move(found.names);
 }

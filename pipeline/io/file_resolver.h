@@ -1,11 +1,14 @@
 #pragma once
 #include <filesystem>
+#include <memory>
 #include <set>
 
-#include "pipeline/io/names/similar_names.h"
+#include "pipeline/io/file_stamp.h"
 #include "pipeline/io/resolver.h"
 
 namespace texmesh {
+
+class FolderLists;
 
 /// Opens files beneath one folder: openat2 with RESOLVE_BENEATH, RESOLVE_NO_SYMLINKS and
 /// RESOLVE_NO_MAGICLINKS, or, where the kernel or a sandbox has no openat2, component by component with
@@ -57,7 +60,7 @@ class FileResolver : public Resolver {
   std::vector<FileRequest> requests_;
   std::map<std::string, std::size_t> index_of_;  // of files
   std::set<std::string> asked_similar_;
-  FolderLists lists_;
+  std::unique_ptr<FolderLists> lists_;  // of folders where similar names are looked for
   std::map<std::string, FileRequest> expected_;
 };
 
