@@ -9,15 +9,17 @@ import { TexmeshViewer } from './element/texmesh_viewer';
 import { TexmeshPage } from './page';
 import { isMetallic } from './page/daylight';
 
-/** Seconds that a decoder of meshes has. One that the page's policy forbids never answers. */
+/** Seconds that a decoder of meshes has. */
 const longestDecodingS = 30;
 const lookS = 0.25;
 /** Loads what a policy allows to be loaded, and ends where it forbids decoders. */
 class PromptLoader extends GLTFLoader {
+  private usesDraco_ = false;
   constructor() {
     super();
     // Pictures within a file are decoded without a URL: policies forbid many pages to fetch blob:.
     this.register((parser) => {
+      this.usesDraco_ = !!parser.json.extensionsUsed?.includes('KHR_draco_mesh_compression');
       const { loadImageSource: load } = parser;
       const known: Promise<Texture>[] = [];
       parser.loadImageSource = async (index, by) => {
@@ -34,8 +36,9 @@ class PromptLoader extends GLTFLoader {
     return new Promise((done, failed) => {
       let leftS = longestDecodingS;
       const timer = setInterval(() => {
-        if ((leftS -= lookS) < 0 || forbidsTextWorkers())
-          failed(new Error('the decoder of meshes gives no answer'));
+        if ((leftS -= lookS) >= 0 && !(this.usesDraco_ && forbidsTextWorkers())) return;
+        clearInterval(timer); // a decoder that is forbidden never answers
+        failed(new Error('the decoder of meshes gives no answer'));
       }, 1000 * lookS);
       super.parseAsync(...of).then(done, failed).finally(() => clearInterval(timer));
     });

@@ -20,15 +20,23 @@ export function slowHostNote(form: string, compressed: boolean, url: string): st
 /** Sources by what browsers call what a policy has forbidden. */
 const sources: Record<string, string> = { blob: 'blob:', 'wasm-eval': "'wasm-unsafe-eval'",
   'trusted-types-policy': 'texmesh', 'trusted-types-sink': 'texmesh' };
+/** '' of what is no address. */
+function originOf(url: string, page?: string): string {
+  try {
+    return new URL(url, page).origin;
+  } catch {
+    return '';
+  }
+}
 /** What a policy must allow; '' where it has forbidden nothing that matters. */
-function policyNote(url: string, forbidden: Iterable<string>): string {
-  const { origin } = new URL(url);
-  const lacking = [...forbidden].map((what) => what.split(' ')).filter(([, blocked]) => blocked in sources ||
-    blocked.startsWith(origin));
-  // There is a decoder without WebAssembly.
-  const wanted = lacking.filter(([, blocked]) => lacking.length < 2 || blocked !== 'wasm-eval')
+function policyNote(url: string, isUnanswered: boolean, forbidden: Iterable<string>): string {
+  const hosts = [originOf(url), originOf(import.meta.url)]; // decoders stand beside the element
+  const lacking = [...forbidden].map((what) => what.split(' ')).filter(([directive, blocked]) =>
+    blocked in sources || (directive === 'connect-src' && hosts.includes(originOf(blocked))));
+  // There is a decoder without WebAssembly, and no answer has to do with it.
+  const wanted = lacking.filter(([, blocked]) => blocked !== 'wasm-eval' || (lacking.length < 2 && !isUnanswered))
     .map(([directive, blocked]) => `${directive.replace(/^require-(trusted-types)-for$/, '$1')} ` +
-      (sources[blocked] ?? origin));
+      (sources[blocked] ?? originOf(blocked)));
   return wanted.length > 0 ? "The page's Content-Security-Policy forbids what the object needs: it must " +
     `have ${[...new Set(wanted)].join(', ')}.` : '';
 }
@@ -38,8 +46,8 @@ function policyNote(url: string, forbidden: Iterable<string>): string {
  * `forbidden`: what the page's policy has forbidden.
  */
 export function causeOf(error: unknown, url: string, page: string, forbidden: Iterable<string> = []): string {
-  const note = policyNote(new URL(url, page).href, forbidden);
   const isUnanswered = error instanceof InputError && !/status/.test(error.found);
+  const note = originOf(url, page) && policyNote(new URL(url, page).href, isUnanswered, forbidden);
   if (note && (isUnanswered || !(error instanceof TexmeshError))) return note;
   if (!(error instanceof TexmeshError)) return '';
   const { found, rule } = error, status = Number(/status (\d+)/.exec(found)?.[1] ?? 0);

@@ -113,6 +113,7 @@ export class RangeStore implements PackageStore {
     const { client } = this.mirrors_;
     const mayTryAgain = retriesOf(client, signal);
     const chunks: Uint8Array[] = [];
+    let etag: string | undefined; // of the first part
     for (let have = 0; ; ) {
       // before memory is taken
       this.require_(m, offset === 0 || m.total < 0 || offset + bytes <= m.total, offset,
@@ -138,15 +139,15 @@ export class RangeStore implements PackageStore {
       if (isNone) this.requireSame_(m, false, offset, `status ${a.status}`);
       if (a.status === 206) {
         this.checkRange_(m, a, range);
-        if (a.etag && a.etag !== m.etag) {
-          this.requireSame_(m, offset > 0 || have === 0, offset, 'another ETag');
-          if (offset > 0) try {
+        etag ??= a.etag;
+        if (offset === 0) this.requireSame_(m, !a.etag || a.etag === etag, offset, 'another ETag');
+        else if (a.etag && a.etag !== m.etag)
+          try {
             await (m.sameStart ??= this.requireStart_(m, 'another ETag'));
           } catch (error) {
             m.sameStart = undefined;
             throw error;
           }
-        }
         chunks.push(a.body);
         have += a.body.length;
         if (a.complete) {

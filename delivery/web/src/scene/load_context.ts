@@ -73,11 +73,20 @@ export class LoadContext {
     return nowS() - this.startS_;
   }
 
-  /** Ends what the timed part waits for, a little behind the limit, and at the end of the load. */
-  untilLimit(): AbortSignal {
+  /** Aborts what the timed part waits for a little behind the limit, and at the end of the load. */
+  async untilLimit<T>(wait: (signal: AbortSignal) => Promise<T>): Promise<T> {
+    const late = new AbortController();
+    const end = (): void => late.abort();
     const leftS = this.limitS * (1 + mostLate) - this.elapsedS();
-    const late = AbortSignal.timeout(Math.ceil(1000 * clamp(leftS, 0, longestS)));
-    return AbortSignal.any?.([late, this.signal]) ?? late;
+    const timer = setTimeout(end, 1000 * clamp(leftS, 0, longestS));
+    this.signal.addEventListener('abort', end);
+    try {
+      throwIfAborted(this.signal);
+      return await wait(late.signal);
+    } finally {
+      clearTimeout(timer);
+      this.signal.removeEventListener('abort', end);
+    }
   }
   /** The timed part begins when whoever gives turns says so; `bytes` of it are fetched however long it is. */
   async turn(bytes: number): Promise<void> {

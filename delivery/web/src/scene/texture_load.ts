@@ -60,7 +60,7 @@ const unseen = 1e-3;
  * to .8 s for 4 million texels.
  */
 const showShare = 0.6;
-/** Scale and planes are chosen anew where less than this share of the time that they were chosen for is left. */
+/** Where less than this share of the time is left, scale and planes are chosen anew. */
 const sameTime = 0.8;
 /** 1 - SSIM at which refining ends by default. */
 const defaultRefineTo = 0.003;
@@ -129,12 +129,12 @@ export class TextureLoad {
     if (options.jnd !== undefined)
       this.alike_ = await (await import('../decide/thesis_list')).coarsestAlike(load);
     let choice = await this.choice_();
-    while (choice.flip !== undefined) {
-      const leftS = this.inTime_.leftS();
+    for (let leftS = this.inTime_.leftS(); leftS > 0 && choice.flip !== undefined; ) {
       // Behind a proxy that looks better than scales do in the time, the rest is refining.
       if (await this.showBetterProxies_(choice.flip)) return this.endTimed_();
-      if (this.inTime_.leftS() > sameTime * leftS) break;
-      choice = await this.choice_();
+      if (this.inTime_.leftS() > sameTime * leftS || !this.scale_.held) break;
+      leftS = this.inTime_.leftS();
+      choice = await this.choice_(); // what was tried has taken time
     }
     const { scale, planes: chosen } = choice;
     if (scale !== this.scale_.shown) load.enter('mesh');
@@ -177,11 +177,11 @@ export class TextureLoad {
       proxyAhead(manifest, proxy.shown, heightPx, { ...link, leftS: inTime.leftS() }, better);
     for (let k; isFree() && (k = next()) >= 0; )
       try {
-        await proxy.show(k, proxy.fetch(k, load.untilLimit()));
+        await load.untilLimit((signal) => proxy.show(k, proxy.fetch(k, signal)));
       } catch (error) {
         throwIfAborted(load.signal);
         lost.add(k); // the smaller one stays
-        if (inTime.leftS() > 0) load.fail(error, 'proxy');
+        load.fail(error, 'proxy');
       }
     return isFree() && (inTime.leftS() <= 0 || proxyLoss(manifest, proxy.shown, heightPx).flip < better.flip);
   }

@@ -51,12 +51,15 @@ it('what a policy forbids is named as it must be allowed', () => {
     [late, ['script-src wasm-eval', 'worker-src blob', 'img-src data'], 'must have worker-src blob:.'],
     [unanswered, [`connect-src ${foreign}`], `must have connect-src ${host}.`],
     [unanswered, ['connect-src https://counter.example/x'], 'did not answer'],
+    [unanswered, ['script-src wasm-eval', `img-src ${host}/pixel.gif`, `connect-src ${host}.evil.example/x`],
+      'did not answer'],
     [asked(foreign, 'status 404'), ['worker-src blob'], 'status 404'],
     [late, ['require-trusted-types-for trusted-types-sink', 'trusted-types trusted-types-policy'],
       'must have trusted-types texmesh.'],
   ];
   for (const [error, forbidden, words] of told)
     expect(causeOf(error, foreign, page, forbidden)).toContain(words);
+  expect(causeOf(late, 'https://[', page, ['worker-src blob'])).toBe('');
 });
 it.each(cases)('%s: visitors get a sentence, the console the rest', (_, error, url, sentence, details) => {
   expect(sentenceOf(error)).toBe(sentence);

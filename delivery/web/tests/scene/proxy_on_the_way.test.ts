@@ -24,7 +24,7 @@ async function stepped(change: object = {}, broken = false): Promise<string[]> {
     reader: { manifest, client: { latencyS: 0.04 }, requests: [] }, view: { display: { heightPx: 1000 } },
     options: { beta0BytesS: 1e5 }, override: {},
     limitS: 20, elapsedS: () => 0.5, memoryBytes: Infinity, expectedBytesS: 0,
-    untilLimit: () => undefined,
+    untilLimit: (wait: () => unknown) => wait(),
     fail: (_: unknown, what: string) => said.push(`failed: ${what}`), ...change,
   } as unknown as LoadContext;
   const shown = {

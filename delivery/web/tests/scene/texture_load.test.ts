@@ -35,7 +35,7 @@ it('planes with more texels take the time that is left where all that was chosen
 });
 
 describe('a proxy that looks better than scales do in the time', () => {
-  /** 30 kB/s; the proxies are as far from S_0 as `flips` say. Of equal ones none comes on the way to scales. */
+  /** 30 kB/s; the proxies are as far from S_0 as `flips` say. Of equal ones none is a step to scales. */
   const [onTheWay, ahead] = [[0.24, 0.005], [0.0051, 0.005]];
   const load = (flips: number[], fault?: Fault, options: Partial<LoadOptions> = {}): Promise<Loading> =>
     loading('http://t/p.texmesh', fakeServer({ '/p.texmesh': golden('v2.0-proxies') }, { fault }),
@@ -74,6 +74,21 @@ describe('a proxy that looks better than scales do in the time', () => {
     expect(performance.now() - from).toBeLessThan(2000);
     expect(l.model.state.proxy).toBe(0);
     expect(l.count('deadline')).toBe(1);
+    l.dispose();
+  });
+  it('is left alone where no time is left, or a scale is chosen by hand meanwhile', async () => {
+    for (const options of [{ time: 0 }, { time: 0, scale: 1 }, { time: 0, policy: 'thesis' as const }]) {
+      const l = await load(ahead, undefined, options);
+      await l.model.done;
+      expect(l.count('deadline')).toBe(1);
+      l.dispose();
+    }
+    const l = await load(ahead, (request) => larger(request) && 'stall');
+    expect(await until(() => l.count('proxy') > 0)).toBe(true);
+    setTimeout(() => l.model.setOverride({ scale: 2 }), 100);
+    await l.model.done;
+    await l.model.refine();
+    expect(await until(() => l.model.state.scale === 2)).toBe(true);
     l.dispose();
   });
   it('that cannot be had leaves the time to scales', async () => {

@@ -84,8 +84,8 @@ export async function loading(url: string, server: FakeServer, load: Partial<Loa
     decode: decodeNothing, meshes: 'glb', time: Infinity, display: 4000, ...load,
   });
   const events: Loading['events'] = [];
-  const names: (keyof LoadEvents)[] = ['request', 'first-picture', 'proxy', 'scale', 'plane', 'fragment', 'decision',
-    'deadline', 'error', 'done'];
+  const names: (keyof LoadEvents)[] = ['request', 'first-picture', 'proxy', 'scale', 'plane', 'fragment',
+    'decision', 'deadline', 'error', 'done'];
   for (const name of names)
     model.on(name, (event) => events.push({ name, event } as Loading['events'][number]));
   return { pkg, model, uploads, events, count: (name) => events.filter((e) => e.name === name).length,
