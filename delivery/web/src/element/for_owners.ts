@@ -34,7 +34,8 @@ function policyNote(url: string, isUnanswered: boolean, forbidden: Iterable<stri
   const lacking = [...forbidden].map((what) => what.split(' ')).filter(([directive, blocked]) =>
     blocked in sources || (directive === 'connect-src' && hosts.includes(originOf(blocked))));
   // There is a decoder without WebAssembly, and no answer has to do with it.
-  const wanted = lacking.filter(([, blocked]) => blocked !== 'wasm-eval' || (lacking.length < 2 && !isUnanswered))
+  const wanted = lacking
+    .filter(([, blocked]) => blocked !== 'wasm-eval' || (lacking.length < 2 && !isUnanswered))
     .map(([directive, blocked]) => `${directive.replace(/^require-(trusted-types)-for$/, '$1')} ` +
       (sources[blocked] ?? originOf(blocked)));
   return wanted.length > 0 ? "The page's Content-Security-Policy forbids what the object needs: it must " +

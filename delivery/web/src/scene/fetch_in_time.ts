@@ -154,7 +154,8 @@ export class FetchInTime {
       const most = 2 * client.options.connections;
       const wishes = upgradeWishes(list, certain * plan.throughputBytesS() * afterS, this.fetching_).slice(0,
         most);
-      if (wishes.length === 0 || (await load.untilLimit((signal) => this.fetching_.fetch(wishes, signal))) === 0) return;
+      if (wishes.length === 0) return;
+      if ((await load.untilLimit((signal) => this.fetching_.fetch(wishes, signal))) === 0) return;
     }
   }
 }

@@ -71,7 +71,8 @@ export class ProxyOnTheWay {
     const { load_: load, proxy_: proxy } = this;
     const part = this.free_ && load.options.policy !== 'thesis' ? await this.part_ : undefined;
     const step = part ? part.stepOf(load) : -1;
-    const bytes = step > Math.max(proxy.shown, 0) ? load.untilLimit((signal) => proxy.fetch(step, signal)) : undefined;
+    const bytes = step > Math.max(proxy.shown, 0)
+      ? load.untilLimit((signal) => proxy.fetch(step, signal)) : undefined;
     const rest = (bytes ?? Promise.resolve()).then(this.fetchRest_, this.fetchRest_);
     rest.catch(() => undefined); // whoever waits hears of it
     return { step, bytes, rest };
