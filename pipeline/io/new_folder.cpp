@@ -74,20 +74,15 @@ void NewFolder::copy(const std::string& path, const fs::path& source) {
 
 void NewFolder::copy_file(const fs::path& file, const fs::path& source) {
   if (folders_.insert(file.parent_path()).second) fs::create_directories(file.parent_path());
-  const Descriptor from{::open(source.c_str(), O_RDONLY | O_CLOEXEC)};
-  if (from.get() < 0) fail_output(source, "read");
-  const Descriptor to{::open(file.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0644)};
-  if (to.get() < 0) fail_output(file, "made");
-  // By hand: what the system offers for copies says "Input/output error" of a disk that is full.
-  Bytes piece(std::size_t{1} << 20);
-  for (ssize_t n = 1; n != 0;) {
-    n = ::read(from.get(), piece.data(), piece.size());
-    if (n < 0 && errno == EINTR) continue;
-    if (n < 0) fail_output(source, "read");
-    if (!write_all(to.get(), ByteSpan(piece).first(static_cast<std::size_t>(n))))
-      fail_output(file, "written");
-  }
-  if (::fchmod(to.get(), 0644) != 0 || ::fdatasync(to.get()) != 0) fail_output(file, "written");
+  std::error_code ec, none;
+  fs::copy_file(source, file, ec);
+  fs::permissions(file, fs::perms{0644}, none);
+  const Descriptor d{::open(file.c_str(), O_WRONLY | O_APPEND | O_CLOEXEC)};
+  // It says "Input/output error" of a disk that is full, too. One more byte tells.
+  if (ec == std::errc::io_error && d.get() >= 0 && !write_all(d.get(), Bytes(1)))
+    fail_output(file, "written");
+  if (ec) throw InputError(source.string(), "", "", "cannot be copied: " + ec.message());
+  if (d.get() < 0 || ::fdatasync(d.get()) != 0) fail_output(file, "written");
 }
 
 bool NewFolder::replace_without_exchange() {

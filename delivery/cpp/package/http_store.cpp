@@ -160,13 +160,12 @@ class HttpSource final : public ByteSource {
     return out;
   }
 
-  /// Fetches the pieces. Bytes that have come are kept even when another piece fails.
+  /// Fetches the pieces. Bytes that have come are kept even when another piece fails, but none that may be
+  /// another package's.
   void fetch(std::vector<Piece> pieces) {
+    if (pieces.empty()) return;
     const auto store_all = [&] {
-      for (std::size_t i = 0; i < pieces.size(); ++i) {
-        pool_->cancel(i);
-        store(pieces[i].offset, std::move(pieces[i].got));
-      }
+      for (Piece& p : pieces) store(p.offset, std::move(p.got));
     };
     try {
       for (std::size_t i = 0; i < pieces.size(); ++i) {
@@ -174,38 +173,54 @@ class HttpSource final : public ByteSource {
         start(i, pieces[i]);
       }
       while (auto ended = pool_->wait(kRequestWait_s)) {
-        Piece& piece = pieces[ended->number];
         const std::size_t asked_of = at_;
-        if (accept(piece, ended->answer)) continue;
-        if (at_ != asked_of)  // another server for what is left
-          for (std::size_t i = 0; i < pieces.size(); ++i) {
-            if (&pieces[i] == &piece || !pool_->so_far(i)) continue;
-            pool_->cancel(i);
-            start(i, pieces[i]);
-          }
-        start(ended->number, piece);
+        if (accept(pieces[ended->number], ended->answer)) continue;
+        if (at_ != asked_of) ask_next_server(pieces, ended->number);
+        start(ended->number, pieces[ended->number]);
       }
-      require_same_start();
     } catch (...) {
-      store_all();
+      for (std::size_t i = 0; i < pieces.size(); ++i) pool_->cancel(i);
+      if (is_same_package()) store_all();
       throw;
     }
+    require_same_start();
     store_all();
   }
-  /// After another ETag: servers behind one name may each have their own. Throws, and keeps nothing, where
-  /// the package begins with other bytes now.
+  /// Whether no answer of the server that is asked may be of another package.
+  bool is_same_package() const { return other_etag_.empty() || same_start_; }
+  void forget_etags() {
+    etag_.clear();
+    other_etag_.clear();
+    same_start_ = false;
+  }
+  /// Asks another server for what is left; for all of it where the last one may have sent another package.
+  void ask_next_server(std::vector<Piece>& pieces, std::size_t failed) {
+    const bool keep = is_same_package();
+    forget_etags();
+    for (std::size_t i = 0; i < pieces.size(); ++i) {
+      if (!keep) pieces[i].got.clear();
+      if (i == failed || (keep && !pool_->so_far(i))) continue;
+      pool_->cancel(i);
+      start(i, pieces[i]);
+    }
+  }
+  /// After another ETag: servers behind one name may each have their own. Throws unless the package still
+  /// begins with the same bytes there.
   void require_same_start() {
-    if (other_etag_.empty() || same_start_) return;
-    same_start_ = true;
+    if (is_same_package()) return;
+    const std::size_t asked_of = at_;
     Piece now{0, std::min(known_from(0).first, kBootstrapBytes), {}, HttpRetries(pool_->options())};
     start(0, now);
     while (auto ended = pool_->wait(kRequestWait_s)) {
       if (accept(now, ended->answer)) break;
+      if (at_ != asked_of) {  // the next read asks another server
+        forget_etags();
+        fail_answer(name(), "byte 0", "an answer with status 206", ended->answer);
+      }
       start(0, now);
     }
-    if (now.got == copy(0, now.bytes)) return;
-    same_start_ = false;
-    fail_replaced("ETag " + other_etag_);
+    if (now.got != copy(0, now.bytes)) fail_replaced("ETag " + other_etag_);
+    same_start_ = true;
   }
   void start(std::size_t number, const Piece& p) {
     const std::uint64_t bytes = p.bytes - p.got.size();
@@ -232,12 +247,10 @@ class HttpSource final : public ByteSource {
     if (may_retry(a) && p.retries->wait(a)) return false;
     if (at_ + 1 < urls_.size() && a.problem != "cancelled") {
       ++at_;
-      etag_.clear();
-      other_etag_.clear();
       p.retries.emplace(pool_->options());
       return false;
     }
-    if (a.status == 200 && is_same_file(a, etag_, *total_))
+    if (a.status == 200 && is_same_file(a, same_start_ ? "" : etag_, *total_))
       throw RangesEnded(name(), place, "an answer with status 206",
                         "status 200: ranges are no longer answered");
     if (a.status == 200 || a.status == 416) fail_replaced("status " + std::to_string(a.status));
@@ -277,7 +290,7 @@ class HttpSource final : public ByteSource {
   std::shared_ptr<HttpPool> pool_;
   std::optional<std::uint64_t> total_;
   std::string etag_, other_etag_;         // of the server that is asked; one that an answer had later
-  bool same_start_ = false;               // and the package began as before then
+  bool same_start_ = false;               // and the package began as before all the same
   std::map<std::uint64_t, Bytes> parts_;  // by offset, not overlapping
 };
 

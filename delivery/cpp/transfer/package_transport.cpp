@@ -205,7 +205,8 @@ class HttpTransport final : public Transport {
     return false;
   }
   static bool is_another(Mirror& mirror, const HttpAnswer& a) {
-    // Another ETag alone is no proof: servers behind one name may each have their own. Digests tell.
+    // Another ETag alone is no proof: servers behind one name may each have their own. Each part is held
+    // against a digest of its own before it is used.
     if (!is_same_file(a, a.total ? "" : mirror.etag, mirror.total)) return true;
     if (a.total) mirror.total = *a.total;
     if (mirror.etag.empty()) mirror.etag = a.etag;

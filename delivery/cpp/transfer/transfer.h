@@ -138,8 +138,8 @@ struct TransportOptions {
 /// Over HTTP, from one or more mirrors that serve the same package: URLs of containers (ranges) or, ending in
 /// a slash, of trees (ranges of an entry, the whole entry where that is asked for). InputError for anything
 /// that is no URL. Requests are tried once: transfer() asks elsewhere or again; what a cut answer has brought
-/// is kept until then. A container that is replaced meanwhile (ETag, length), or that is not
-/// answered in ranges, has failed for good.
+/// is kept until then. A container whose length changes (or its ETag, where an answer has no length), or that
+/// is not answered in ranges, has failed for good. Digests of parts are the caller's matter (Accept).
 std::unique_ptr<Transport> open_transport(const std::vector<std::string>& mirrors,
                                           const TransportOptions& options = {});
 /// From a store that is here, without a network: every request is answered at once.

@@ -5,6 +5,7 @@
 #include <zlib.h>
 
 #include <algorithm>
+#include <atomic>
 #include <map>
 
 #include "format/base/bytes.h"
@@ -484,6 +485,12 @@ TEST(HttpStore, RangesThatEndLeadToTheTreeOfTheSamePackage) {
   EXPECT_NE(read_with(whole(""), other).error.find("replaced"), std::string::npos);
 }
 
+std::string other_package() {  // as long as package()
+  std::string other = package();
+  for (char& c : other) c ^= 1;
+  return other;
+}
+
 TEST(HttpStore, AReplacedPackageIsReadAnew) {
   const auto replaced = [](const std::function<std::string(const Request&)>& later) {
     return read_with(later, tree_files()).error.find("replaced, read it anew") != std::string::npos;
@@ -491,8 +498,7 @@ TEST(HttpStore, AReplacedPackageIsReadAnew) {
   const std::string longer = package() + "more";
   EXPECT_TRUE(replaced([](const Request&) { return answer(200, "ETag: \"two\"\r\n", package()); }));
   EXPECT_TRUE(replaced([&](const Request&) { return answer(200, "", longer); }));
-  std::string other = package();
-  for (char& c : other) c ^= 1;
+  const std::string other = other_package();
   EXPECT_TRUE(replaced([&](const Request& r) { return ranged(other, r, "ETag: \"two\"\r\n"); }));
   EXPECT_TRUE(replaced([&](const Request& r) { return ranged(longer, r); }));
   EXPECT_TRUE(replaced([](const Request&) { return answer(416, "", ""); }));
@@ -512,6 +518,61 @@ TEST(HttpStore, ServersBehindOneNameMayHaveETagsOfTheirOwn) {
       {});
   EXPECT_EQ(got.error, "");
   EXPECT_GT(got.read, 0u);
+  const LaterAnswers ended = read_with(
+      [](const Request& r) {
+        const std::string etag = "ETag: \"" + std::to_string(r.number) + "\"\r\n";
+        return r.number < 5 ? ranged(package(), r, etag) : answer(200, etag, package());
+      },
+      tree_files());
+  EXPECT_EQ(ended.error, "");
+  EXPECT_TRUE(ended.tree);
+}
+
+TEST(HttpStore, NothingOfAReplacedPackageIsKept) {
+  std::atomic<int> fails = 0;  // of requests for the start
+  std::atomic<bool> replaced = true;
+  RawServer server([&](const Request& r) {
+    if (r.number == 0) return Reply{ranged(package(), r, "ETag: \"one\"\r\n")};
+    if (r.first == 0 && fails-- > 0) return Reply{answer(404, "", "no")};
+    return Reply{ranged(replaced ? other_package() : package(), r, "ETag: \"two\"\r\n")};
+  });
+  const auto store = open_url(server.url("/a.texmesh"), quick());
+  const EntryRef e = read_manifest(store->read_manifest()).scales.front().glb;
+  const auto said = [&] {
+    try {
+      store->read(e, 0, e.bytes);
+      return std::string();
+    } catch (const Error& error) {
+      return std::string(error.what());
+    }
+  };
+  const std::string expected = "replaced, read it anew";
+  EXPECT_NE(said().find(expected), std::string::npos);
+  EXPECT_NE(said().find(expected), std::string::npos) << "the second read has bytes of the first";
+  fails = 1;
+  EXPECT_NE(said().find("status 404"), std::string::npos);
+  EXPECT_NE(said().find(expected), std::string::npos) << "a look that failed counts as one";
+  replaced = false;
+  EXPECT_EQ(said(), "");
+  EXPECT_TRUE(text_of(store->read(e, 0, e.bytes)) == package().substr(e.offset, e.bytes));
+}
+
+TEST(HttpStore, TheNextServerSendsAgainWhatMayBeOfAnotherPackage) {
+  std::atomic<std::uint64_t> failing = 0;
+  RawServer replaced([&](const Request& r) {
+    if (r.first == failing && r.number > 0) return Reply{answer(500, "", "")};
+    return Reply{ranged(r.number == 0 ? package() : other_package(), r,
+                        r.number == 0 ? "ETag: \"one\"\r\n" : "ETag: \"two\"\r\n")};
+  });
+  RawServer well([](const Request& r) { return Reply{ranged(package(), r)}; });
+  const auto store = open_urls({replaced.url("/a.texmesh"), well.url("/a.texmesh")}, quick());
+  const Manifest m = read_manifest(store->read_manifest());
+  const EntryRef a = m.scales.front().glb, b = m.scales.at(1).glb;
+  failing = a.offset;
+  // Not all of them: ranges that meet would be one request.
+  store->prefetch({{a.path, a.offset, 10000, {}}, {b.path, b.offset, 10000, {}}});
+  for (const EntryRef& e : {a, b})
+    EXPECT_TRUE(text_of(store->read(e, 0, 10000)) == package().substr(e.offset, 10000)) << e.path;
 }
 
 TEST(HttpStore, TellsHowItsServerCanBeRead) {
