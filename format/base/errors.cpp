@@ -1,5 +1,6 @@
 #include "format/base/errors.h"
 
+#include <algorithm>
 #include <string_view>
 #include <utility>
 
@@ -16,6 +17,7 @@ std::string joined(std::string_view file, std::string_view place, std::string_vi
   };
   add(": ", "", file);
   add(": ", "", place);
+  std::ranges::replace(s, '\n', '?');  // the name of a file cannot pretend to be another message
   add(": ", "expected ", expected);
   add(expected.empty() ? ": " : ", ", expected.empty() ? "" : "found ", found);
   return s;

@@ -119,7 +119,7 @@ void read_meta_file(CompileArguments& args) {
 }
 
 void tell_of_notes(const Notes& notes) {
-  for (const Note& note : notes) std::cerr << "texmesh: " << note.place << ": " << note.text << '\n';
+  for (const Note& note : notes) std::cerr << "texmesh: " << printable(note.place + ": " + note.text) << '\n';
 }
 
 /// What is left out of the file is told at once: it is the same for every model.
@@ -382,7 +382,7 @@ int run_compile(CompileArguments& args) {
   } catch (const PermissionError&) {
     throw;
   } catch (const ResourceError& e) {
-    std::cerr << "texmesh: " << e.what() << '\n';
+    std::cerr << "texmesh: " << printable(e.what()) << '\n';
     return kExitTryAgain;
   }
 }
@@ -450,7 +450,7 @@ int verify(const CacheArguments& args) {
   Json list = Json::array();
   for (const CacheDamage& d : damage) {
     list.push_back({{"path", d.path}, {"reason", d.reason}});
-    if (!args.json) std::cout << d.path << ": " << d.reason << "; moved to quarantine\n";
+    if (!args.json) std::cout << printable(d.path) << ": " << d.reason << "; moved to quarantine\n";
   }
   if (args.json)
     std::cout << Json{{"damaged", list}}.dump(1) << '\n';
@@ -481,12 +481,13 @@ int run_list(const ListArguments& args) {
     return kExitOk;
   }
   for (const ListedModel& m : list.models) {
-    std::cout << m.input << " -> " << m.output << "  " << format_bytes(m.bytes);
+    std::cout << printable(m.input + " -> " + m.output) << "  " << format_bytes(m.bytes);
     if (args.shards > 1) std::cout << "  shard " << m.shard;
     std::cout << '\n';
   }
   for (const std::string& package : list.stale)
-    std::cout << package << ": no model makes this package any more (compile --remove-stale removes it)\n";
+    std::cout << printable(package)
+              << ": no model makes this package any more (compile --remove-stale removes it)\n";
   return kExitOk;
 }
 
@@ -524,8 +525,8 @@ int run_merge(const MergeArguments& args) {
   if (!args.junit.empty()) write_text_file(args.junit, write_junit(merged));
   write_collection_page(merged, args);
   for (const SummaryProblem& p : merged.problems)
-    std::cerr << "texmesh summary: " << p.kind << ": " << (p.file.empty() ? "" : p.file + ": ") << p.text
-              << '\n';
+    std::cerr << "texmesh summary: " << p.kind << ": "
+              << printable((p.file.empty() ? "" : p.file + ": ") + p.text) << '\n';
   const SummaryCounts c = count_results(merged.models);
   std::cout << fmt::format("{} compiled, {} up to date, {} failed, {} cancelled in {} {}, {}\n", c.compiled,
                            c.unchanged, c.failed, c.cancelled, merged.parts.size(),

@@ -316,7 +316,7 @@ void tell_rendered(const RenderArguments& args, const RenderedModel& model, cons
   double covered = 0;
   for (const SheetView& v : sheet.views) covered += v.covered_px;
   const double pixels = static_cast<double>(sheet.views.size()) * args.size_px * args.size_px;
-  std::cout << fmt::format("{}: {}, {}, {} of {} px, {:.1f} % covered\n", last_name(args.output),
+  std::cout << fmt::format("{}: {}, {}, {} of {} px, {:.1f} % covered\n", printable(last_name(args.output)),
                            counted(model.mesh.triangles.size(), "triangle"),
                            counted(model.textures.size(), "texture"), counted(sheet.views.size(), "view"),
                            args.size_px, 100 * covered / pixels);

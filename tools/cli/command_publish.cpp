@@ -101,7 +101,7 @@ int run_report(const ReportArguments& args) {
     std::cout << to_json_line(report) << '\n';
   else
     std::cout << report.verdict << '\n'
-              << (std::filesystem::path(args.folder) / "index.html").string() << '\n';
+              << printable((std::filesystem::path(args.folder) / "index.html").string()) << '\n';
   return report.holds ? kExitOk : kExitDifferent;
 }
 
@@ -173,8 +173,8 @@ int run_export(const ExportArguments& args) {
   if (args.json) {
     std::cout << export_list(made);
   } else {
-    std::cout << (std::filesystem::path(args.folder) / made.open).string() << '\n';
-    for (const std::string& note : made.notes) std::cout << "note: " << note << '\n';
+    std::cout << printable((std::filesystem::path(args.folder) / made.open).string()) << '\n';
+    for (const std::string& note : made.notes) std::cout << "note: " << printable(note) << '\n';
   }
   return kExitOk;
 }
@@ -285,7 +285,7 @@ int run_site(SiteArguments& args) {
   if (args.json)
     std::cout << to_json_line(SiteReport{page, site.objects, site.faults, site.stale}) << '\n';
   else
-    std::cout << page << ", " << counted(site.objects.size(), "object") << '\n';
+    std::cout << printable(page) << ", " << counted(site.objects.size(), "object") << '\n';
   return site.faults.empty() ? kExitOk : kExitModelFailed;
 }
 

@@ -215,9 +215,9 @@ DocumentSchema extract_schema() {
 }
 
 std::string extract_text(const Extracted& e) {
-  std::string text = fmt::format("{}: {} bytes, {} with {} triangles", e.name, grouped(e.glb.size()),
-                                 e.proxy ? fmt::format("proxy {}", *e.proxy) : fmt::format("S_{}", e.scale),
-                                 grouped(e.triangles));
+  std::string text = fmt::format(
+      "{}: {} bytes, {} with {} triangles", printable(e.name), grouped(e.glb.size()),
+      e.proxy ? fmt::format("proxy {}", *e.proxy) : fmt::format("S_{}", e.scale), grouped(e.triangles));
   for (std::size_t l = 1; l < e.levels.size(); ++l)
     text += fmt::format("{} S_{}", l == 1 ? ", levels" : ",", e.levels[l]);
   const bool is_whole_proxy = e.proxy && e.images.empty();

@@ -128,6 +128,21 @@ TEST_F(Names, WhatATerminalTakesForCommandsIsNotPrinted) {
   EXPECT_EQ(said.find('\x1b'), std::string::npos) << said;
   const CommandResult missing = run_command({TEXMESH_BINARY, "dump", folder_ / "\x1b[2J.texmesh"});
   EXPECT_NE(missing.errors.find("?[2J.texmesh"), std::string::npos) << missing.errors;
+  const CommandResult forged = run_command({TEXMESH_BINARY, "dump", folder_ / "x\ntexmesh: all is well"});
+  EXPECT_NE(forged.errors.find("x?texmesh: all is well: "), std::string::npos) << forged.errors;
+  const CommandResult list =
+      run_command({TEXMESH_BINARY, "list", folder_ / "repository/scans", "-o", folder_ / "out"});
+  EXPECT_NE(list.output.find("a?[31m?b.obj -> "), std::string::npos) << list.output << list.errors;
+  EXPECT_EQ(list.output.find('\x1b'), std::string::npos) << list.output;
+}
+
+TEST_F(Names, WarningsGiveATerminalNoCommands) {
+  std::string material = read_text(scans("a.mtl"));
+  material.replace(material.find(texture_), texture_.size(), "\x1b[2J.jpg");
+  write_text(scans("a.mtl"), material);
+  const CommandResult r = run_command({TEXMESH_BINARY, "doctor", scans("a.obj")});
+  EXPECT_NE(r.errors.find("?[2J"), std::string::npos) << r.errors;
+  EXPECT_EQ(r.errors.find('\x1b'), std::string::npos) << r.errors;
 }
 
 TEST_F(Names, ALimitOnFilesIsToldAsOne) {

@@ -150,7 +150,8 @@ void apply_profile(const std::string& profile, CompileOptions& options) {
 void print_warnings(const Notes& notes) {
   for (const Note& n : notes)
     if (n.severity == Severity::kWarning)
-      std::cerr << "warning: " << n.code << (n.place.empty() ? "" : ": " + n.place) << ": " << n.text << '\n';
+      std::cerr << "warning: " << n.code << printable((n.place.empty() ? "" : ": " + n.place) + ": " + n.text)
+                << '\n';
 }
 
 Option add_package_argument(Command& c, std::string& package, bool urls) {
