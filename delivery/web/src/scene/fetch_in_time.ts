@@ -67,7 +67,7 @@ export const composeS = 0.015;
 /** A rest of less than this share of the limit, a round trip taken off, is not worth another request. */
 const leastRest = 0.004;
 /** Share of the bytes promised by the throughput that a request may count on. */
-export const certain = 0.85;
+const certain = 0.85;
 
 /** A busy page hears late, and asks late: it asks for at most so many seconds more of the link at once. */
 const mostBusyS = 0.25;

@@ -12,7 +12,7 @@ import { throwIfAborted } from '../format/errors';
 import { worthwhileFlip } from '../format/shared_numbers';
 import { nextTurn, nowS, sleepS } from '../http/requests';
 import type { PlaneComposer } from './composer';
-import { FetchInTime, certain, composeS } from './fetch_in_time';
+import { FetchInTime, composeS } from './fetch_in_time';
 import { FragmentFetch, allWishes, bestWishes, requestBytes } from './fragment_fetch';
 import { gpuBytes } from './gpu';
 import type { LoadContext } from './load_context';
@@ -60,6 +60,8 @@ const unseen = 1e-3;
  * to .8 s for 4 million texels.
  */
 const showShare = 0.6;
+/** Share of the throughput that a proxy counts on: a link that slows down a little makes none late. */
+const certain = 0.9;
 /** Where less than this share of the time is left, scale and planes are chosen anew. */
 const sameTime = 0.8;
 /** 1 - SSIM at which refining ends by default. */
@@ -170,7 +172,6 @@ export class TextureLoad {
     const { beta0, reader: { manifest, client }, view: { display: { heightPx } } } = load;
     const { proxy } = scale_;
     const better = { flip: flip - worthwhileFlip, fits: (k: number) => fits(load, k) && !lost.has(k) };
-    // A link that slows down a little makes none late.
     const link = { bytesS: certain * beta0, rttS: client.latencyS };
     const isFree = (): boolean => scale_.held && load.override.scale === undefined && !inTime.printed;
     const next = (): number =>
