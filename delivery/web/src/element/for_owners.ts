@@ -29,8 +29,9 @@ function originOf(url: string, page?: string): string {
   }
 }
 /** What a policy must allow; '' where it has forbidden nothing that matters. */
-function policyNote(url: string, isUnanswered: boolean, forbidden: Iterable<string>): string {
-  const hosts = [originOf(url), originOf(import.meta.url)]; // decoders stand beside the element
+function policyNote(host: string, isUnanswered: boolean, forbidden: Iterable<string>): string {
+  // Decoders stand beside the element.
+  const hosts = [host, originOf(import.meta.url)].filter((origin) => origin !== '');
   const lacking = [...forbidden].map((what) => what.split(' ')).filter(([directive, blocked]) =>
     blocked in sources || (directive === 'connect-src' && hosts.includes(originOf(blocked))));
   // There is a decoder without WebAssembly, and no answer has to do with it.
@@ -48,7 +49,8 @@ function policyNote(url: string, isUnanswered: boolean, forbidden: Iterable<stri
  */
 export function causeOf(error: unknown, url: string, page: string, forbidden: Iterable<string> = []): string {
   const isUnanswered = error instanceof InputError && !/status/.test(error.found);
-  const note = originOf(url, page) && policyNote(new URL(url, page).href, isUnanswered, forbidden);
+  const from = originOf(url, page);
+  const note = policyNote(from, isUnanswered, forbidden);
   if (note && (isUnanswered || !(error instanceof TexmeshError))) return note;
   if (!(error instanceof TexmeshError)) return '';
   const { found, rule } = error, status = Number(/status (\d+)/.exec(found)?.[1] ?? 0);
@@ -60,7 +62,7 @@ export function causeOf(error: unknown, url: string, page: string, forbidden: It
     return 'The file changes from answer to answer: the servers behind its address have several versions.';
   const { origin } = new URL(page);
   if (error instanceof InputError && status === 0)
-    return new URL(url, page).origin === origin
+    return from === origin
       ? 'The server did not answer, or it sends the request on to a host that does not allow it (CORS).'
       : `The server did not answer, or it does not let ${origin} read its files: it must send ` +
         'Access-Control-Allow-Origin (CORS).';

@@ -61,7 +61,7 @@ const unseen = 1e-3;
  */
 const showShare = 0.6;
 /** Share of the throughput that a proxy counts on: a link that slows down a little makes none late. */
-const certain = 0.9;
+const proxyCertain = 0.9;
 /** Where less than this share of the time is left, scale and planes are chosen anew. */
 const sameTime = 0.8;
 /** 1 - SSIM at which refining ends by default. */
@@ -172,7 +172,7 @@ export class TextureLoad {
     const { beta0, reader: { manifest, client }, view: { display: { heightPx } } } = load;
     const { proxy } = scale_;
     const better = { flip: flip - worthwhileFlip, fits: (k: number) => fits(load, k) && !lost.has(k) };
-    const link = { bytesS: certain * beta0, rttS: client.latencyS };
+    const link = { bytesS: proxyCertain * beta0, rttS: client.latencyS };
     const isFree = (): boolean => scale_.held && load.override.scale === undefined && !inTime.printed;
     const next = (): number =>
       proxyAhead(manifest, proxy.shown, heightPx, { ...link, leftS: inTime.leftS() }, better);

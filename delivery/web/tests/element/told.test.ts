@@ -59,7 +59,9 @@ it('what a policy forbids is named as it must be allowed', () => {
   ];
   for (const [error, forbidden, words] of told)
     expect(causeOf(error, foreign, page, forbidden)).toContain(words);
-  expect(causeOf(late, 'https://[', page, ['worker-src blob'])).toBe('');
+  // an address that is none
+  expect(causeOf(late, 'https://[', page, ['connect-src data'])).toBe('');
+  expect(causeOf(asked('https://[', 'Failed to fetch'), 'https://[', page)).toContain('did not answer');
 });
 it.each(cases)('%s: visitors get a sentence, the console the rest', (_, error, url, sentence, details) => {
   expect(sentenceOf(error)).toBe(sentence);

@@ -2,6 +2,7 @@ import { describe, expect, it } from 'vitest';
 import { type Fault, fakeServer } from '../support/fake_server';
 import { golden } from '../support/files';
 import { type Loading, loading, until } from '../support/loading';
+import { PackageReader } from '../../src/reader';
 import type { LoadOptions } from '../../src/scene/api';
 import { files, url } from '../support/scan';
 
@@ -34,17 +35,18 @@ it('planes with more texels take the time that is left where all that was chosen
   l.dispose();
 });
 
-describe('a proxy that looks better than scales do in the time', () => {
+describe('a proxy that looks better than scales do in the time', async () => {
+  const { manifest } = await PackageReader.openBytes(golden('v2.0-proxies'), 'golden');
   /** 30 kB/s; the proxies are as far from S_0 as `flips` say. Of equal ones none is a step to scales. */
   const [onTheWay, ahead] = [[0.24, 0.005], [0.0051, 0.005]];
   const load = (flips: number[], fault?: Fault, options: Partial<LoadOptions> = {}): Promise<Loading> =>
     loading('http://t/p.texmesh', fakeServer({ '/p.texmesh': golden('v2.0-proxies') }, { fault }),
-      { time: 0.8, beta0BytesS: 30e3, display: 500, autoRefine: false, ...options }, {}, ({ manifest }) =>
-        manifest.proxies.forEach(({ flip }, k) => flip.fill(flips[k])));
+      { time: 0.8, beta0BytesS: 30e3, display: 500, autoRefine: false, ...options }, {}, (pkg) =>
+        pkg.manifest.proxies.forEach(({ flip }, k) => flip.fill(flips[k])));
   /** Proxy, scale and number of textures. */
   const shown = ({ model: { state } }: Loading): number[] => [state.proxy, state.scale, state.planes.length];
-  const larger = ({ range }: Parameters<Fault>[0]): boolean => range?.[0] === 20864;
-  const finest = ({ range }: Parameters<Fault>[0]): boolean => range?.[0] === 75328;
+  const larger = ({ range }: Parameters<Fault>[0]): boolean => range?.[0] === manifest.proxies[1].glb.offset;
+  const finest = ({ range }: Parameters<Fault>[0]): boolean => range?.[0] === manifest.scales[0].glb.offset;
   it.each([onTheWay, ahead])('of %d and %d ends the timed part; refining goes on to scales',
       async (...flips) => {
     const l = await load(flips);
