@@ -1,45 +1,79 @@
 #pragma once
-// Functions of single precision with the same bits on every machine, plain enough for a compiler to take
-// several values at once.
+// Functions of single precision with the same bits on every machine, of one value or of several at once.
 #include <algorithm>
+#include <array>
 #include <bit>
+#include <cmath>
+#include <concepts>
 #include <cstdint>
 
 #include "format/base/portable_math.h"
 
 namespace texmesh {
 
+/// Several floats at once, as many as every processor takes. What is written for F takes a float or Lanes,
+/// and gives a lane the bits that it gives a float.
+using Lanes = float __attribute__((vector_size(16)));
+using LaneInts = std::int32_t __attribute__((vector_size(16)));
+inline constexpr std::size_t kLanes = 4;
+template <class F>
+concept Float = std::same_as<F, float> || std::same_as<F, Lanes>;
+
+/// Whole numbers of the sizes of F, and F of them. Towards 0; |x| < 2^31.
+inline std::int32_t whole_of(float x) { return static_cast<std::int32_t>(x); }
+inline LaneInts whole_of(Lanes x) { return __builtin_convertvector(x, LaneInts); }
+inline float number_of(std::int32_t i) { return static_cast<float>(i); }
+inline Lanes number_of(LaneInts i) { return __builtin_convertvector(i, Lanes); }
+
+/// Whether it is so in any lane.
+inline bool any(bool is) { return is; }
+inline bool any(LaneInts is) {
+  const auto halves = std::bit_cast<std::array<std::uint64_t, 2>>(is);
+  return (halves[0] | halves[1]) != 0;
+}
+inline float root_of(float x) { return std::sqrt(x); }
+inline Lanes root_of(Lanes x) {
+  return Lanes{std::sqrt(x[0]), std::sqrt(x[1]), std::sqrt(x[2]), std::sqrt(x[3])};
+}
+
 /// NaN becomes `low`.
-inline float clamped(float x, float low, float high) {
-  const float above = x > low ? x : low;
+template <Float F>
+F clamped(F x, float low, float high) {
+  const F above = x > low ? x : low;
   return above < high ? above : high;
 }
 /// The largest integer that is not above x; |x| < 2^31.
 inline std::int32_t floor_of(float x) {
-  const auto i = static_cast<std::int32_t>(x);
-  return i - (x < static_cast<float>(i) ? 1 : 0);
+  const std::int32_t i = whole_of(x);
+  return i - (x < number_of(i) ? 1 : 0);
+}
+inline LaneInts floor_of(Lanes x) {
+  const LaneInts i = whole_of(x);
+  return i + (x < number_of(i));  // true is -1
 }
 
 /// Within 1e-6 for a normal x > 0: the series of atanh around the mantissa nearest to 1.
-inline float log2_of(float x) {
-  const auto bits = std::bit_cast<std::uint32_t>(x);
+template <Float F>
+F log2_of(F x) {
+  using Ints = decltype(whole_of(x));
+  const Ints bits = std::bit_cast<Ints>(x);
   // 0x3f3504f3 is sqrt(1/2): the mantissa comes to lie between sqrt(1/2) and sqrt(2).
-  const auto exponent = static_cast<std::int32_t>(bits - 0x3f3504f3u) >> 23;
-  const float m = std::bit_cast<float>(bits - (static_cast<std::uint32_t>(exponent) << 23));
-  const float t = (m - 1) / (m + 1), t2 = t * t;
-  return static_cast<float>(exponent) +
-         2.88539008f * t * (1 + t2 * (0.333333333f + t2 * (0.2f + t2 * 0.142857143f)));
+  const Ints exponent = (bits - 0x3f3504f3) >> 23;
+  const F m = std::bit_cast<F>(bits - (exponent << 23));
+  const F t = (m - 1) / (m + 1), t2 = t * t;
+  return number_of(exponent) + 2.88539008f * t * (1 + t2 * (0.333333333f + t2 * (0.2f + t2 * 0.142857143f)));
 }
 
 /// Within 3e-7 of the value for -126 <= x <= 126; x beyond is cut off, NaN counts as -126.
-inline float exp2_of(float x) {
-  const float at = clamped(x, -126, 126);
-  const std::int32_t whole = floor_of(at + 0.5f);
-  const float f = (at - static_cast<float>(whole)) * 0.693147181f;
-  const float value =
+template <Float F>
+F exp2_of(F x) {
+  const F at = clamped(x, -126, 126);
+  const auto whole = floor_of(at + 0.5f);
+  const F f = (at - number_of(whole)) * 0.693147181f;
+  const F value =
       1 + f * (1 + f * (0.5f + f * (0.166666667f +
                                     f * (0.0416666667f + f * (0.00833333333f + f * 0.00138888889f)))));
-  return value * std::bit_cast<float>(static_cast<std::uint32_t>(whole + 127) << 23);
+  return value * std::bit_cast<F>((whole + 127) << 23);
 }
 
 /// A function of 0 .. 1 by linear interpolation between kSteps + 1 samples.

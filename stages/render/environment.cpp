@@ -108,32 +108,54 @@ Vec3f filtered(const Level& radiance, const std::vector<LobeSample>& lobe, Vec3f
 /// Real spherical harmonics of the bands 0 to 4.
 template <class T>
 std::array<T, kHarmonics> harmonics_of(Vec3<T> d) {
+  using Number = std::conditional_t<std::same_as<T, double>, double, float>;
+  const auto n = [](double number) { return static_cast<Number>(number); };
   const T x = d.x, y = d.y, z = d.z, x2 = x * x, y2 = y * y, z2 = z * z;
-  return {T(0.28209479177387814),
-          T(0.48860251190291992) * y,
-          T(0.48860251190291992) * z,
-          T(0.48860251190291992) * x,
-          T(1.0925484305920792) * x * y,
-          T(1.0925484305920792) * y * z,
-          T(0.31539156525252005) * (3 * z2 - 1),
-          T(1.0925484305920792) * x * z,
-          T(0.54627421529603959) * (x2 - y2),
-          T(0.59004358992664352) * y * (3 * x2 - y2),
-          T(2.8906114426405538) * x * y * z,
-          T(0.45704579946446572) * y * (5 * z2 - 1),
-          T(0.37317633259011540) * z * (5 * z2 - 3),
-          T(0.45704579946446572) * x * (5 * z2 - 1),
-          T(1.4453057213202769) * z * (x2 - y2),
-          T(0.59004358992664352) * x * (x2 - 3 * y2),
-          T(2.5033429417967046) * x * y * (x2 - y2),
-          T(1.7701307697799304) * y * z * (3 * x2 - y2),
-          T(0.94617469575756008) * x * y * (7 * z2 - 1),
-          T(0.66904654355728921) * y * z * (7 * z2 - 3),
-          T(0.10578554691520431) * (35 * z2 * z2 - 30 * z2 + 3),
-          T(0.66904654355728921) * x * z * (7 * z2 - 3),
-          T(0.47308734787878004) * (x2 - y2) * (7 * z2 - 1),
-          T(1.7701307697799304) * x * z * (x2 - 3 * y2),
-          T(0.62583573544917614) * (x2 * x2 - 6 * x2 * y2 + y2 * y2)};
+  return {T{} + n(0.28209479177387814),
+          n(0.48860251190291992) * y,
+          n(0.48860251190291992) * z,
+          n(0.48860251190291992) * x,
+          n(1.0925484305920792) * x * y,
+          n(1.0925484305920792) * y * z,
+          n(0.31539156525252005) * (3 * z2 - 1),
+          n(1.0925484305920792) * x * z,
+          n(0.54627421529603959) * (x2 - y2),
+          n(0.59004358992664352) * y * (3 * x2 - y2),
+          n(2.8906114426405538) * x * y * z,
+          n(0.45704579946446572) * y * (5 * z2 - 1),
+          n(0.37317633259011540) * z * (5 * z2 - 3),
+          n(0.45704579946446572) * x * (5 * z2 - 1),
+          n(1.4453057213202769) * z * (x2 - y2),
+          n(0.59004358992664352) * x * (x2 - 3 * y2),
+          n(2.5033429417967046) * x * y * (x2 - y2),
+          n(1.7701307697799304) * y * z * (3 * x2 - y2),
+          n(0.94617469575756008) * x * y * (7 * z2 - 1),
+          n(0.66904654355728921) * y * z * (7 * z2 - 3),
+          n(0.10578554691520431) * (35 * z2 * z2 - 30 * z2 + 3),
+          n(0.66904654355728921) * x * z * (7 * z2 - 3),
+          n(0.47308734787878004) * (x2 - y2) * (7 * z2 - 1),
+          n(1.7701307697799304) * x * z * (x2 - 3 * y2),
+          n(0.62583573544917614) * (x2 * x2 - 6 * x2 * y2 + y2 * y2)};
+}
+
+template <Float F>
+Vec3<F> irradiance_at(const RenderEnvironment& environment, Vec3<F> normal) {
+  const std::array<F, kHarmonics> basis = harmonics_of(normal);
+  Vec3<F> sum;
+  for (std::size_t k = 0; k < kHarmonics; ++k) {
+    const Vec4f& light = environment.irradiance[k];
+    sum = sum + Vec3<F>{light.x * basis[k], light.y * basis[k], light.z * basis[k]};
+  }
+  return {clamped(sum.x, 0, 65504), clamped(sum.y, 0, 65504), clamped(sum.z, 0, 65504)};
+}
+
+/// `place`: octahedral().
+Quad lobe_at(const RenderEnvironment& environment, Vec2f place, float roughness) {
+  const float at = saturated(roughness) * static_cast<float>(environment.levels.size() - 1);
+  const auto sharp = std::min(static_cast<std::size_t>(at), environment.levels.size() - 2);
+  const Quad a = read_level(environment.levels[sharp], place),
+             b = read_level(environment.levels[sharp + 1], place);
+  return a + (b - a) * (at - static_cast<float>(sharp));
 }
 
 std::array<Vec4f, kHarmonics> irradiance_of(const Radiance& radiance) {
@@ -205,20 +227,25 @@ RenderEnvironment prepare_environment(const Radiance& radiance, const KeyLight& 
 }
 
 Vec3f diffuse_light(const RenderEnvironment& environment, Vec3f normal) {
-  const std::array<float, kHarmonics> basis = harmonics_of(normal);
-  Quad sum{};
-  for (std::size_t k = 0; k < kHarmonics; ++k) sum += quad_of(environment.irradiance[k]) * basis[k];
-  return {clamped(sum[0], 0, 65504), clamped(sum[1], 0, 65504), clamped(sum[2], 0, 65504)};
+  return irradiance_at(environment, normal);
+}
+Vec3<Lanes> diffuse_light(const RenderEnvironment& environment, Vec3<Lanes> normal) {
+  return irradiance_at(environment, normal);
 }
 
 Vec3f specular_light(const RenderEnvironment& environment, Vec3f direction, float roughness) {
   if (environment.levels.empty()) return {};
-  const float at = saturated(roughness) * static_cast<float>(environment.levels.size() - 1);
-  const auto sharp = std::min(static_cast<std::size_t>(at), environment.levels.size() - 2);
-  const Vec2f place = octahedral(direction);
-  const Quad a = read_level(environment.levels[sharp], place),
-             b = read_level(environment.levels[sharp + 1], place);
-  return colour_of(a + (b - a) * (at - static_cast<float>(sharp)));
+  return colour_of(lobe_at(environment, octahedral(direction), roughness));
+}
+Vec3<Lanes> specular_light(const RenderEnvironment& environment, Vec3<Lanes> direction, Lanes roughness) {
+  Vec3<Lanes> out;
+  if (environment.levels.empty()) return out;
+  const Vec2<Lanes> place = octahedral(direction);
+  for (std::size_t i = 0; i < kLanes; ++i) {
+    const Quad c = lobe_at(environment, {place.x[i], place.y[i]}, roughness[i]);
+    out.x[i] = c[0], out.y[i] = c[1], out.z[i] = c[2];
+  }
+  return out;
 }
 
 Vec3f studio_radiance(Vec3f direction) {

@@ -3,6 +3,7 @@
 #include <vector>
 
 #include "format/base/vec.h"
+#include "stages/base/float_math.h"
 #include "stages/base/run_context.h"
 
 namespace texmesh {
@@ -64,7 +65,9 @@ RenderEnvironment daylight_environment(Vec3f x, Vec3f y, Vec3f z, bool metallic)
 
 /// Irradiance / pi on a surface with that unit normal; >= 0.
 Vec3f diffuse_light(const RenderEnvironment& environment, Vec3f normal);
+Vec3<Lanes> diffuse_light(const RenderEnvironment& environment, Vec3<Lanes> normal);
 /// The mean radiance that a lobe of that roughness (0..1) around the unit direction sees.
 Vec3f specular_light(const RenderEnvironment& environment, Vec3f direction, float roughness);
+Vec3<Lanes> specular_light(const RenderEnvironment& environment, Vec3<Lanes> direction, Lanes roughness);
 
 }  // namespace texmesh

@@ -1,5 +1,7 @@
 #include "stages/render/fragment_shader.h"
 
+#include <cstring>
+
 #include "stages/render/shade.h"
 
 namespace texmesh {
@@ -11,63 +13,13 @@ Vec3f xyz(Vec4f v) { return {v.x, v.y, v.z}; }
 
 std::size_t index_of(TextureUse use) { return static_cast<std::size_t>(use); }
 
-Vec3f mixed(Vec3f a, Vec3f b, float part) { return a + (b - a) * part; }
-Vec3f f0_of(const LitSurface& s) { return mixed({0.04f, 0.04f, 0.04f}, s.base_colour, s.metallic); }
-
-/// Lagarde and de Rousiers 2014: occlusion of what comes from the direction of the mirror.
-float specular_occlusion(float n_dot_v, float occlusion, float roughness) {
-  if (!(occlusion < 1)) return 1;
-  const float base = n_dot_v + occlusion;
-  if (!(base > 0)) return 0;
-  const float power = exp2_of(exp2_of(-16 * roughness - 1) * log2_of(base < 1e-30f ? 1e-30f : base));
-  return saturated(power - 1 + occlusion);
+/// Whether bits are the same in all lanes.
+template <class T>
+bool same(const T& a, const T& b) {
+  return std::memcmp(&a, &b, sizeof a) == 0;
 }
 
-/// Light of a unit of irradiance from one direction.
-Vec3f reflected_from_key(const LitSurface& s, const Lighting& lighting) {
-  if (lighting.n_dot_l == 0) return {};
-  const float lambert = (1 - s.metallic) / kFloatPi;
-  const Vec3f f0 = f0_of(s);
-  Vec3f out;
-  for (int k = 0; k < 3; ++k) {
-    const float fresnel = f0[k] + (1 - f0[k]) * lighting.schlick;
-    out[k] = (s.base_colour[k] * lambert * (1 - fresnel) + fresnel * lighting.mirrored) * lighting.n_dot_l;
-  }
-  return out;
-}
-
-void add_key(const LitSurface& s, Vec3f to_light, Vec3f to_viewer, Lighting& out) {
-  out.n_dot_l = saturated(dot(s.normal, to_light));
-  if (out.n_dot_l == 0) return;
-  const Vec3f half = normalized(to_light + to_viewer);
-  const float n_dot_v = saturated(dot(s.normal, to_viewer)), n_dot_h = saturated(dot(s.normal, half)),
-              v_dot_h = saturated(dot(to_viewer, half));
-  const float alpha = s.roughness * s.roughness;
-  out.mirrored = smith_visibility(alpha, out.n_dot_l, n_dot_v) * ggx_distribution(alpha, n_dot_h);
-  out.schlick = schlick_weight(v_dot_h);
-}
-
-/// Light from all around, with what a second and later reflection between microfacets adds (Fdez-Aguera
-/// 2019).
-Vec3f reflected_surroundings(const LitSurface& s, const Lighting& lighting) {
-  const Vec3f f0 = f0_of(s);
-  const Vec2f ab = lighting.split;
-  Vec3f single, multiple;
-  const float lost = 1 - (ab.x + ab.y);
-  for (int k = 0; k < 3; ++k) {
-    single[k] = f0[k] * ab.x + ab.y;
-    const float average = f0[k] + (1 - f0[k]) * (1.f / 21);
-    multiple[k] = single[k] * average / (1 - lost * average) * lost;
-  }
-  const float left = 1 - largest(single + multiple);
-  const Vec3f light = lighting.diffuse;
-  const Vec3f diffuse = product(s.base_colour, light) * ((1 - s.metallic) * left * s.occlusion);
-  const Vec3f specular =
-      (product(lighting.glossy, single) + product(light, multiple)) *
-      (s.occlusion == lighting.occlusion ? lighting.occluded
-                                         : specular_occlusion(lighting.n_dot_v, s.occlusion, s.roughness));
-  return diffuse + specular;
-}
+void put(Vec3<Lanes>& to, std::size_t lane, Vec3f v) { to.x[lane] = v.x, to.y[lane] = v.y, to.z[lane] = v.z; }
 
 }  // namespace
 
@@ -247,27 +199,31 @@ class FragmentShader::Fragment {
       if (reads[i].texture && !(read_[i] == reads[i])) site(reads[i].site).prefetch(*reads[i].texture);
   }
 
-  FragmentColour colour(const Reads& reads) {
+  /// The colour that lighting does not change, and into the lane what it needs.
+  FragmentColour gather(const Reads& reads, std::size_t lane, VariantLanes& to) {
     const RenderMaterial& material = *prepared_.material;
     const Vec4f base = base_colour(reads);
     FragmentColour out;
-    out.alpha = 1;
-    if (material.alpha_mode == AlphaMode::kMask && base.w < material.alpha_cutoff) return {};
-    if (material.alpha_mode == AlphaMode::kBlend) out.alpha = base.w;
-    if (out.alpha == 0) return {};
-    out.linear = material.unlit ? tone_mapped(xyz(base)) : lit(reads, base);
+    out.alpha = material.alpha_mode == AlphaMode::kBlend ? base.w : 1;
+    if (material.alpha_mode == AlphaMode::kMask && base.w < material.alpha_cutoff) out.alpha = 0;
+    to.is_lit[lane] = out.alpha != 0 && !material.unlit;
+    if (to.is_lit[lane])
+      put_surface(reads, base, lane, to);
+    else if (out.alpha != 0)
+      out.linear = tone_mapped(xyz(base));
     return out;
   }
 
- private:
-  /// Of the first variant that was lit.
-  struct Known {
-    Vec4f normal_texel;
-    LitSurface surface;
-    Lighting lighting;
-    Vec3f linear;
-  };
+  /// Behind all variants.
+  void put_place(std::size_t lane, FragmentLanes& to) const {
+    put(to.to_viewer, lane, place_.to_viewer);
+    put(to.normal, lane, normal_);
+    for (std::size_t k = 0; k < 2; ++k) put(to.frame[k], lane, frame_[k]);
+    to.normal_scale[lane] = prepared_.material->normal_scale;
+    to.side[lane] = back_ ? -1.f : 1.f;
+  }
 
+ private:
   Vec4f texel(const Reads& reads, TextureUse use) {
     const std::size_t i = index_of(use);
     if (read_[i] == reads[i]) return texel_[i];
@@ -307,62 +263,37 @@ class FragmentShader::Fragment {
     has_frame_ = true;
   }
 
-  Vec3f mapped_normal(const Reads& reads, Vec4f texel) {
-    const Read& read = reads[index_of(TextureUse::kNormal)];
-    if (!read.texture) return normal_;
-    if (!has_frame_) find_frame(prepared_.sites[read.site]);
-    const float scale = prepared_.material->normal_scale;
-    const Vec3f sum = frame_[0] * ((texel.x * 2 - 1) * scale) + frame_[1] * ((texel.y * 2 - 1) * scale) +
-                      normal_ * (texel.z * 2 - 1);
-    const float square = dot(sum, sum);
-    return square > kNone && square < 1e20f ? sum * (1 / std::sqrt(square)) : normal_;
-  }
-
   /// All but the normal.
-  LitSurface surface_of(const Reads& reads, Vec4f base) {
+  void put_surface(const Reads& reads, Vec4f base, std::size_t lane, VariantLanes& to) {
+    if (!has_normal_) normal_ = shader_.interpolated_normal(place_, geometry_roughness_);
+    has_normal_ = true;
     const RenderMaterial& material = *prepared_.material;
-    LitSurface out;
-    out.base_colour = xyz(base);
-    out.metallic = material.metallic;
-    out.roughness = material.roughness;
-    float occlusion = 1;
+    float metallic = material.metallic, roughness = material.roughness, occlusion = 1;
     const bool shared =
         reads[index_of(TextureUse::kOcclusion)] == reads[index_of(TextureUse::kMetallicRoughness)];
     if (has(reads, TextureUse::kMetallicRoughness)) {
       const Vec4f texel_here = texel(reads, TextureUse::kMetallicRoughness);
-      out.roughness *= texel_here.y;
-      out.metallic *= texel_here.z;
+      roughness *= texel_here.y;
+      metallic *= texel_here.z;
       if (shared) occlusion = texel_here.x;
     }
     if (has(reads, TextureUse::kOcclusion) && !shared) occlusion = texel(reads, TextureUse::kOcclusion).x;
-    out.occlusion = saturated(1 + (occlusion - 1) * material.occlusion_strength);
-    out.roughness = clamped(out.roughness, kLeastRoughness, 1) + geometry_roughness_;
-    if (!(out.roughness < 1)) out.roughness = 1;
-    out.emission = material.emissive;
-    if (has(reads, TextureUse::kEmissive) && largest(out.emission) > 0)
-      out.emission = product(out.emission, xyz(texel(reads, TextureUse::kEmissive)));
-    return out;
-  }
-
-  Vec3f lit(const Reads& reads, Vec4f base) {
-    const bool first = !has_known_;
-    if (first) normal_ = shader_.interpolated_normal(place_, geometry_roughness_);
-    LitSurface surface = surface_of(reads, base);
-    const Vec4f normal_texel =
-        has(reads, TextureUse::kNormal) ? texel(reads, TextureUse::kNormal) : Vec4f{0, 0, 0, -1};
-    const bool same_normal = !first && normal_texel == known_.normal_texel;
-    surface.normal =
-        same_normal ? known_.surface.normal : mapped_normal(reads, normal_texel) * (back_ ? -1.f : 1.f);
-    const bool same_lighting = same_normal && surface.roughness == known_.surface.roughness;
-    if (same_lighting && surface == known_.surface) return known_.linear;
-    const RenderEnvironment& environment = shader_.environment_;
-    const Lighting lighting = same_lighting ? known_.lighting
-                                            : lighting_of(surface, place_.to_viewer, environment,
-                                                          same_normal ? &known_.lighting : nullptr);
-    const Vec3f linear = tone_mapped(radiance_of(surface, lighting, environment));
-    if (first) known_ = {normal_texel, surface, lighting, linear};
-    has_known_ = true;
-    return linear;
+    roughness = clamped(roughness, kLeastRoughness, 1) + geometry_roughness_;
+    Vec3f emission = material.emissive;
+    if (has(reads, TextureUse::kEmissive) && largest(emission) > 0)
+      emission = product(emission, xyz(texel(reads, TextureUse::kEmissive)));
+    put(to.surface.base_colour, lane, xyz(base));
+    put(to.surface.emission, lane, emission);
+    to.surface.metallic[lane] = metallic;
+    to.surface.roughness[lane] = roughness < 1 ? roughness : 1;
+    to.surface.occlusion[lane] = saturated(1 + (occlusion - 1) * material.occlusion_strength);
+    Vec4f normal_texel{0, 0, 0, -1};
+    if (has(reads, TextureUse::kNormal)) {
+      normal_texel = texel(reads, TextureUse::kNormal);
+      if (!has_frame_) find_frame(prepared_.sites[reads[index_of(TextureUse::kNormal)].site]);
+    }
+    to.normal_texel.x[lane] = normal_texel.x, to.normal_texel.y[lane] = normal_texel.y;
+    to.normal_texel.z[lane] = normal_texel.z, to.normal_texel.w[lane] = normal_texel.w;
   }
 
   const FragmentShader& shader_;
@@ -375,61 +306,80 @@ class FragmentShader::Fragment {
   Vec3f normal_;  // between those of the wedges
   float geometry_roughness_ = 0;
   Vec3f frame_[2];
-  bool has_frame_ = false, has_known_ = false;
-  Known known_;
+  bool has_frame_ = false, has_normal_ = false;
 };
 
-void FragmentShader::colours_of(std::uint32_t pixel, const RenderFragment& fragment, Scratch& scratch,
-                                std::span<FragmentColour> out) const {
+void FragmentShader::gather(const FragmentInPixel& seen, std::size_t lane, Scratch& scratch,
+                            std::span<FragmentColour> out) const {
+  const RenderFragment& fragment = seen.fragment;
   const RenderMaterial& material = scene_.material_of(fragment.triangle);
   const Prepared& prepared = materials_[static_cast<std::size_t>(&material - scene_.materials->data())];
-  Scratch::Seen& seen = scratch.triangles[fragment.triangle % Scratch::kTriangles];
-  if (seen.index != fragment.triangle) seen = {fragment.triangle, triangle_in_view(fragment.triangle)};
-  const FragmentPlace place = place_of(pixel, fragment, seen.in_view);
+  Scratch::Seen& triangle = scratch.triangles[fragment.triangle % Scratch::kTriangles];
+  if (triangle.index != fragment.triangle)
+    triangle = {fragment.triangle, triangle_in_view(fragment.triangle)};
+  const FragmentPlace place = place_of(seen.pixel, fragment, triangle.in_view);
   Fragment here(*this, prepared, place, fragment.back != 0, scratch);
   if (out.size() > 1) here.prefetch(prepared.variants[0]);
   for (std::size_t v = 0; v < out.size(); ++v) {
     if (v + 1 < out.size()) here.prefetch(prepared.variants[v + 1]);
-    out[v] = here.colour(prepared.variants[v]);
+    out[v] = here.gather(prepared.variants[v], lane, scratch.variants[v]);
   }
+  here.put_place(lane, scratch.lanes);
 }
 
-Vec2f split_sum(float roughness, float n_dot_v) {
-  const float x = 1 - roughness, y = 0.0425f - 0.0275f * roughness, z = 1.04f - 0.572f * roughness,
-              w = 0.022f * roughness - 0.04f;
-  const float squared = x * x, falling = exp2_of(-9.28f * n_dot_v);
-  const float a004 = (squared < falling ? squared : falling) * x + y;
-  return {z - 1.04f * a004, w + 1.04f * a004};
-}
+namespace {
 
-Vec3f reflected_by_brdf(const LitSurface& s, Vec3f to_light, Vec3f to_viewer) {
-  Lighting lighting;
-  add_key(s, to_light, to_viewer, lighting);
-  return reflected_from_key(s, lighting);
-}
-
-Lighting lighting_of(const LitSurface& s, Vec3f to_viewer, const RenderEnvironment& environment,
-                     const Lighting* same_normal) {
-  Lighting out;
-  add_key(s, environment.key.towards, to_viewer, out);
-  const float cosine = dot(s.normal, to_viewer);
-  out.n_dot_v = saturated(cosine);
-  out.split = split_sum(s.roughness, out.n_dot_v);
-  out.diffuse = same_normal ? same_normal->diffuse : diffuse_light(environment, s.normal);
-  if (!environment.levels.empty()) {
-    // A rough lobe's mean direction leans towards the normal.
-    const Vec3f mirror = s.normal * (2 * cosine) - to_viewer;
-    const Vec3f direction = normalized(mixed(mirror, s.normal, s.roughness * s.roughness));
-    out.glossy = specular_light(environment, direction, s.roughness);
-  }
-  out.occlusion = s.occlusion;
-  out.occluded = specular_occlusion(out.n_dot_v, s.occlusion, s.roughness);
+Vec3<Lanes> mapped_normal(const auto& at, const Vec4<Lanes>& texel) {
+  const Vec3<Lanes> sum = at.frame[0] * ((texel.x * 2 - 1) * at.normal_scale) +
+                          at.frame[1] * ((texel.y * 2 - 1) * at.normal_scale) + at.normal * (texel.z * 2 - 1);
+  const Lanes square = dot(sum, sum), scale = 1 / root_of(square);
+  const LaneInts is_mapped = (texel.w >= 0) & (square > kNone) & (square < 1e20f);
+  Vec3<Lanes> out;
+  for (int k = 0; k < 3; ++k) out[k] = (is_mapped ? sum[k] * scale : at.normal[k]) * at.side;
   return out;
 }
 
-Vec3f radiance_of(const LitSurface& s, const Lighting& lighting, const RenderEnvironment& environment) {
-  return product(reflected_from_key(s, lighting), environment.key.irradiance) +
-         reflected_surroundings(s, lighting) + s.emission;
+}  // namespace
+
+/// Each variant takes over what the first one has found of the same texels.
+void FragmentShader::light(std::size_t lanes, Scratch& scratch, std::span<FragmentColour> out) const {
+  const std::size_t variants = scratch.variants.size();
+  VariantLanes& first = scratch.variants[0];
+  LightingOf<Lanes> first_lighting;
+  Vec3<Lanes> first_linear;
+  for (std::size_t v = 0; v < variants; ++v) {
+    VariantLanes& here = scratch.variants[v];
+    if (!any(here.is_lit != 0)) continue;
+    const bool is_first = v == 0, same_normal = !is_first && same(here.normal_texel, first.normal_texel);
+    here.surface.normal =
+        same_normal ? first.surface.normal : mapped_normal(scratch.lanes, here.normal_texel);
+    Vec3<Lanes> linear;
+    if (!is_first && same(here.surface, first.surface)) {
+      linear = first_linear;
+    } else {
+      const bool same_lighting = same_normal && same(here.surface.roughness, first.surface.roughness);
+      const LightingOf<Lanes> lighting =
+          same_lighting ? first_lighting
+                        : lighting_of(here.surface, scratch.lanes.to_viewer, environment_,
+                                      same_normal ? &first_lighting : nullptr);
+      linear = tone_mapped_of(radiance_of(here.surface, lighting, environment_));
+      if (is_first) first_lighting = lighting, first_linear = linear;
+    }
+    for (std::size_t i = 0; i < lanes; ++i)
+      if (here.is_lit[i]) out[i * variants + v].linear = {linear.x[i], linear.y[i], linear.z[i]};
+  }
+}
+
+void FragmentShader::colours_of(std::span<const FragmentInPixel> fragments, Scratch& scratch,
+                                std::span<FragmentColour> out) const {
+  const std::size_t variants = out.size() / fragments.size();
+  scratch.variants.resize(variants);
+  for (std::size_t begin = 0; begin < fragments.size(); begin += kLanes) {
+    const std::size_t lanes = std::min(kLanes, fragments.size() - begin);
+    for (std::size_t i = 0; i < lanes; ++i)
+      gather(fragments[begin + i], i, scratch, out.subspan((begin + i) * variants, variants));
+    light(lanes, scratch, out.subspan(begin * variants, lanes * variants));
+  }
 }
 
 }  // namespace texmesh

@@ -52,35 +52,45 @@ class Samples {
   std::array<float, kSamples> left_{};  // of the light from behind
 };
 
-/// The fragments of one pixel at a time, in all variants.
+/// Pixels with their fragments, in all variants. Those that were added are shaded together.
 class PixelShader {
  public:
   PixelShader(const FragmentShader& shader, PictureVariants& pictures, Vec3f background, bool all_shaded)
-      : shader_(shader),
-        pictures_(pictures),
-        background_(background),
-        all_shaded_(all_shaded),
-        colours_(pictures.count() * (kMaxLayers + kSamples)) {}
+      : shader_(shader), pictures_(pictures), background_(background), all_shaded_(all_shaded) {}
 
   /// `at` indexes the pictures' places.
-  void shade(std::size_t at, std::span<const RenderFragment> fragments) {
-    const std::size_t variants = pictures_.count();
+  void add(std::size_t at, std::span<const RenderFragment> fragments) {
+    constexpr std::size_t kTogether = 128;
     const bool layers = fragments.front().layer != 0;
     float covered = 0;
     for (const RenderFragment& f : fragments) covered += share_of(f);
     if (!layers && !all_shaded_) fragments = most_seen(fragments);
-    for (std::size_t i = 0; i < fragments.size(); ++i)
-      shader_.colours_of(pictures_.places()[at], fragments[i], scratch_,
-                         {colours_.data() + i * variants, variants});
-    for (std::size_t v = 0; v < variants; ++v) {
-      if (layers)
-        put_layers(at, fragments, v);
-      else
-        put_opaque(at, fragments, covered, v);
-    }
+    pixels_.push_back({at, fragments_.size(), fragments.size(), layers, covered});
+    for (const RenderFragment& f : fragments) fragments_.push_back({pictures_.places()[at], f});
+    if (fragments_.size() >= kTogether) finish();
+  }
+
+  void finish() {
+    const std::size_t variants = pictures_.count();
+    if (fragments_.empty() || variants == 0) return;
+    colours_.resize(fragments_.size() * variants);
+    shader_.colours_of(fragments_, scratch_, colours_);
+    for (const Pixel& pixel : pixels_)
+      for (std::size_t v = 0; v < variants; ++v) {
+        if (pixel.layers)
+          put_layers(pixel, v);
+        else
+          put_opaque(pixel, v);
+      }
+    pixels_.clear(), fragments_.clear();
   }
 
  private:
+  struct Pixel {
+    std::size_t at, first, count;  // of fragments_
+    bool layers;                   // something lets what lies behind show
+    float covered;                 // of its samples
+  };
   const FragmentColour& colour(std::size_t fragment, std::size_t variant) const {
     return colours_[fragment * pictures_.count() + variant];
   }
@@ -100,34 +110,33 @@ class PixelShader {
     return most_seen_;
   }
 
-  /// Nothing can be seen through what the pixel shows, of which so much is covered.
-  void put_opaque(std::size_t at, std::span<const RenderFragment> fragments, float covered,
-                  std::size_t variant) {
+  /// Nothing can be seen through what the pixel shows.
+  void put_opaque(const Pixel& pixel, std::size_t variant) {
     Vec3f sum;
     float shaded = 0;
-    for (std::size_t i = 0; i < fragments.size(); ++i) {
-      const float share = share_of(fragments[i]);
+    for (std::size_t i = pixel.first; i < pixel.first + pixel.count; ++i) {
+      const float share = share_of(fragments_[i].fragment);
       sum = sum + colour(i, variant).linear * share;
       shaded += share;
     }
-    if (shaded < covered) sum = sum * (covered / shaded);
-    pictures_.set(variant, at, sum + background_ * (1 - covered), true);
+    if (shaded < pixel.covered) sum = sum * (pixel.covered / shaded);
+    pictures_.set(variant, pixel.at, sum + background_ * (1 - pixel.covered), true);
   }
 
-  void put_layers(std::size_t at, std::span<const RenderFragment> fragments, std::size_t variant) {
+  void put_layers(const Pixel& pixel, std::size_t variant) {
     bool mixes = false, covered = false;
-    for (std::size_t i = 0; i < fragments.size(); ++i) {
+    for (std::size_t i = pixel.first; i < pixel.first + pixel.count; ++i) {
       const float alpha = colour(i, variant).alpha;
       mixes = mixes || (alpha > 0 && alpha < 1);
       covered = covered || alpha > 0;
     }
     Samples samples(mixes);
-    for (std::size_t i = 0; i < fragments.size(); ++i) {
+    for (std::size_t i = pixel.first; i < pixel.first + pixel.count; ++i) {
       const FragmentColour& c = colour(i, variant);
-      if (c.alpha > 0) samples.put_behind(fragments[i].mask, c.linear, c.alpha);
+      if (c.alpha > 0) samples.put_behind(fragments_[i].fragment.mask, c.linear, c.alpha);
     }
     samples.put_behind((1u << kSamples) - 1, background_, 1);
-    pictures_.set(variant, at, samples.mean(), covered);
+    pictures_.set(variant, pixel.at, samples.mean(), covered);
   }
 
   const FragmentShader& shader_;
@@ -135,6 +144,8 @@ class PixelShader {
   Vec3f background_;
   bool all_shaded_;
   FragmentShader::Scratch scratch_;
+  std::vector<Pixel> pixels_;
+  std::vector<FragmentInPixel> fragments_;
   std::vector<FragmentColour> colours_;  // [fragment][variant]
   std::array<RenderFragment, kMostShaded> most_seen_;
 };
@@ -213,8 +224,9 @@ PictureVariants shade_variants(const RenderScene& scene, const Visibility& visib
     PixelShader pixel(shader, out, environment.background, visibility.side_px <= kSmallSidePx);
     for (std::size_t i = begin; i < end; ++i) {
       const std::uint32_t at = order[i], place = places[at], first = visibility.first[place];
-      pixel.shade(at, {visibility.fragments.data() + first, visibility.first[place + 1] - first});
+      pixel.add(at, {visibility.fragments.data() + first, visibility.first[place + 1] - first});
     }
+    pixel.finish();
   });
   return out;
 }
@@ -226,22 +238,7 @@ Picture shade(const RenderScene& scene, const Visibility& visibility,
   return shade_variants(scene, visibility, {&materials, 1}, textures, environment, context).picture(0);
 }
 
-Vec3f tone_mapped(Vec3f linear) {
-  constexpr float kStart = 0.8f - 0.04f, kDesaturation = 0.15f, kRoom = 1 - kStart;
-  Vec3f c;
-  for (int k = 0; k < 3; ++k) c[k] = clamped(linear[k], 0, 65504);
-  const float xy = c.x < c.y ? c.x : c.y, least = xy < c.z ? xy : c.z;
-  const float offset = least < 0.08f ? least - 6.25f * least * least : 0.04f;
-  c = c - Vec3f{offset, offset, offset};
-  const float peak = largest(c);
-  if (peak >= kStart) {
-    const float new_peak = 1 - kRoom * kRoom / (peak + kRoom - kStart);
-    const float grey = 1 - 1 / (kDesaturation * (peak - new_peak) + 1);
-    c = c * (new_peak / peak);
-    c = c + (Vec3f{new_peak, new_peak, new_peak} - c) * grey;
-  }
-  return {saturated(c.x), saturated(c.y), saturated(c.z)};
-}
+Vec3f tone_mapped(Vec3f linear) { return tone_mapped_of(linear); }
 
 Pixels encode_srgb(const Picture& picture) {
   Pixels out{picture.side_px, picture.side_px, 3, {}};
