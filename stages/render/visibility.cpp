@@ -1,5 +1,3 @@
-#include <optional>
-
 #ifdef __SSE2__
 #include <emmintrin.h>
 #endif
@@ -315,14 +313,14 @@ RenderFragment TileTriangle::fragment(std::uint32_t triangle, std::uint32_t pixe
 }
 
 struct LayerHit {
-  std::uint32_t pixel = 0, triangle = 0;
+  std::uint32_t pixel = 0, place = 0;  // of the triangle
   float nearness = 0;
   std::uint16_t mask = 0;
 };
 bool before(const LayerHit& a, const LayerHit& b) {
   if (a.pixel != b.pixel) return a.pixel < b.pixel;
   if (a.nearness != b.nearness) return a.nearness > b.nearness;
-  return a.triangle < b.triangle;
+  return a.place < b.place;
 }
 
 /// Sorts, and keeps the kMaxLayers nearest of every pixel.
@@ -345,44 +343,10 @@ class Tile {
         depth_(kTileSamples * kTileSamples, 0.f),
         nearest_(kTileSamples * kTileSamples, kNoIndex) {}
 
-  void draw_opaque(std::uint32_t t) {
-    const TileTriangle triangle(input_, t, left_, top_);
-    if (!shows(triangle, t)) return;
-    const SampleBox& box = triangle.box();
-    drawn_ = {std::min(drawn_.x_first, box.x_first), std::min(drawn_.y_first, box.y_first),
-              std::max(drawn_.x_last, box.x_last), std::max(drawn_.y_last, box.y_last)};
-    triangle.for_each_sample([&](std::int32_t x, std::int32_t y, double nearness) {
-      const std::size_t i = static_cast<std::size_t>(y) * kTileSamples + static_cast<std::size_t>(x);
-      const auto d = static_cast<float>(nearness);
-      if (!(d > depth_[i])) return;
-      depth_[i] = d;
-      nearest_[i] = t;
-    });
-  }
-
-  /// Behind all opaque triangles.
-  void add_layer(std::uint32_t t) {
-    const TileTriangle triangle(input_, t, left_, top_);
-    if (!shows(triangle, t)) return;
-    masks_.assign(kTilePixels, 0);
-    triangle.for_each_sample([&](std::int32_t x, std::int32_t y, double nearness) {
-      const std::size_t i = static_cast<std::size_t>(y) * kTileSamples + static_cast<std::size_t>(x);
-      if (static_cast<float>(nearness) < depth_[i]) return;
-      masks_[pixel_of(x, y)] |= static_cast<std::uint16_t>(1u << bit_of(x, y));
-    });
-    const SampleBox& box = triangle.box();
-    for (std::int32_t y = box.y_first / kSamplesPerSide; y <= box.y_last / kSamplesPerSide; ++y)
-      for (std::int32_t x = box.x_first / kSamplesPerSide; x <= box.x_last / kSamplesPerSide; ++x) {
-        const std::uint32_t pixel = static_cast<std::uint32_t>(y) * kTilePx + static_cast<std::uint32_t>(x);
-        if (masks_[pixel] == 0) continue;
-        const Vec2d mean = mean_of_samples(masks_[pixel]);
-        hits_.push_back({pixel, t,
-                         static_cast<float>(
-                             triangle.nearness(x * kSamplesPerSide + mean.x, y * kSamplesPerSide + mean.y)),
-                         masks_[pixel]});
-      }
-    if (hits_.size() > kMostHits) keep_nearest(hits_);
-  }
+  /// By rising index.
+  void draw_opaque(std::uint32_t t) { add(t, &Tile::draw); }
+  /// The same, behind all opaque triangles.
+  void add_layer(std::uint32_t t) { add(t, &Tile::put_layer); }
 
   TileFragments finish() {
     keep_nearest(hits_);
@@ -392,7 +356,7 @@ class Tile {
     for (std::uint32_t pixel = 0; pixel < kTilePixels; ++pixel) {
       const std::size_t before_pixel = out.fragments.size();
       for (; hit != hits_.end() && hit->pixel == pixel; ++hit)
-        out.fragments.push_back(fragment(hit->triangle, pixel, hit->mask, true));
+        out.fragments.push_back(fragment(hit->place, pixel, hit->mask, true));
       if (may_be_drawn(pixel)) add_opaque(pixel, out.fragments);
       out.count[pixel] = static_cast<std::uint32_t>(out.fragments.size() - before_pixel);
     }
@@ -400,9 +364,53 @@ class Tile {
   }
 
  private:
-  bool shows(const TileTriangle& triangle, std::uint32_t t) const {
-    return triangle.planes().visible &&
-           (triangle.planes().front || input_.scene->material_of(t).double_sided);
+  /// Keeps the triangle if it is seen from this side, and `is_drawn` finds it in a sample.
+  void add(std::uint32_t t, bool (Tile::*is_drawn)(const TileTriangle&, std::uint32_t place)) {
+    const auto place = static_cast<std::uint32_t>(triangles_.size());
+    const TileTriangle& triangle = triangles_.emplace_back(t, TileTriangle(input_, t, left_, top_)).second;
+    const EdgePlanes& planes = triangle.planes();
+    const bool shows = planes.visible && (planes.front || input_.scene->material_of(t).double_sided);
+    if (!shows || !(this->*is_drawn)(triangle, place)) triangles_.pop_back();
+  }
+
+  bool draw(const TileTriangle& triangle, std::uint32_t place) {
+    const SampleBox& box = triangle.box();
+    drawn_ = {std::min(drawn_.x_first, box.x_first), std::min(drawn_.y_first, box.y_first),
+              std::max(drawn_.x_last, box.x_last), std::max(drawn_.y_last, box.y_last)};
+    bool seen = false;
+    triangle.for_each_sample([&](std::int32_t x, std::int32_t y, double nearness) {
+      const std::size_t i = static_cast<std::size_t>(y) * kTileSamples + static_cast<std::size_t>(x);
+      const auto d = static_cast<float>(nearness);
+      if (!(d > depth_[i])) return;
+      depth_[i] = d;
+      nearest_[i] = place;
+      seen = true;
+    });
+    return seen;
+  }
+
+  bool put_layer(const TileTriangle& triangle, std::uint32_t place) {
+    masks_.assign(kTilePixels, 0);
+    bool seen = false;
+    triangle.for_each_sample([&](std::int32_t x, std::int32_t y, double nearness) {
+      const std::size_t i = static_cast<std::size_t>(y) * kTileSamples + static_cast<std::size_t>(x);
+      if (static_cast<float>(nearness) < depth_[i]) return;
+      masks_[pixel_of(x, y)] |= static_cast<std::uint16_t>(1u << bit_of(x, y));
+      seen = true;
+    });
+    const SampleBox& box = triangle.box();
+    for (std::int32_t y = box.y_first / kSamplesPerSide; y <= box.y_last / kSamplesPerSide; ++y)
+      for (std::int32_t x = box.x_first / kSamplesPerSide; x <= box.x_last / kSamplesPerSide; ++x) {
+        const std::uint32_t pixel = static_cast<std::uint32_t>(y) * kTilePx + static_cast<std::uint32_t>(x);
+        if (masks_[pixel] == 0) continue;
+        const Vec2d mean = mean_of_samples(masks_[pixel]);
+        hits_.push_back({pixel, place,
+                         static_cast<float>(
+                             triangle.nearness(x * kSamplesPerSide + mean.x, y * kSamplesPerSide + mean.y)),
+                         masks_[pixel]});
+      }
+    if (hits_.size() > kMostHits) keep_nearest(hits_);
+    return seen;
   }
 
   bool may_be_drawn(std::uint32_t pixel) const {
@@ -411,14 +419,12 @@ class Tile {
            y >= drawn_.y_first / kSamplesPerSide && y <= drawn_.y_last / kSamplesPerSide;
   }
 
-  /// Neighbouring pixels mostly show the same triangle.
-  RenderFragment fragment(std::uint32_t t, std::uint32_t pixel, std::uint16_t mask, bool layer) {
-    if (!shown_ || shown_index_ != t) shown_.emplace(input_, t, left_, top_);
-    shown_index_ = t;
-    return shown_->fragment(t, pixel, mask, layer);
+  RenderFragment fragment(std::uint32_t place, std::uint32_t pixel, std::uint16_t mask, bool layer) const {
+    const auto& [index, triangle] = triangles_[place];
+    return triangle.fragment(index, pixel, mask, layer);
   }
 
-  /// The triangle that all samples of a pixel show, if one does.
+  /// The place of the triangle that all samples of a pixel show, if one does.
   std::uint32_t whole_pixel(std::size_t corner) const {
     const std::uint32_t t = nearest_[corner];
     std::uint32_t other = 0;
@@ -434,34 +440,34 @@ class Tile {
       out.push_back(fragment(whole, pixel, 0xFFFF, false));
       return;
     }
-    std::uint32_t triangles[16];
+    std::uint32_t places[16];
     std::uint16_t masks[16];
     std::size_t count = 0;
     for (unsigned s = 0; s < 16; ++s) {
-      const std::uint32_t t = nearest_[corner + s / 4 * kTileSamples + s % 4];
-      if (t == kNoIndex) continue;
+      const std::uint32_t place = nearest_[corner + s / 4 * kTileSamples + s % 4];
+      if (place == kNoIndex) continue;
       std::size_t at = 0;
-      while (at < count && triangles[at] != t) ++at;
-      if (at == count) triangles[count] = t, masks[count++] = 0;
+      while (at < count && places[at] != place) ++at;
+      if (at == count) places[count] = place, masks[count++] = 0;
       masks[at] = static_cast<std::uint16_t>(masks[at] | 1u << s);
     }
     for (std::size_t i = 1; i < count; ++i)
-      for (std::size_t k = i; k > 0 && triangles[k] < triangles[k - 1]; --k) {
-        std::swap(triangles[k], triangles[k - 1]);
+      for (std::size_t k = i; k > 0 && places[k] < places[k - 1]; --k) {
+        std::swap(places[k], places[k - 1]);
         std::swap(masks[k], masks[k - 1]);
       }
-    for (std::size_t i = 0; i < count; ++i) out.push_back(fragment(triangles[i], pixel, masks[i], false));
+    for (std::size_t i = 0; i < count; ++i) out.push_back(fragment(places[i], pixel, masks[i], false));
   }
 
   const TileInput& input_;
   std::int32_t left_, top_;
-  std::vector<float> depth_;  // nearness 1 / w, 0 = nothing
-  std::vector<std::uint32_t> nearest_;
+  std::vector<std::pair<std::uint32_t, TileTriangle>>
+      triangles_;                                        // that samples have shown, rising; opaque first
+  std::vector<float> depth_;                             // nearness 1 / w, 0 = nothing
+  std::vector<std::uint32_t> nearest_;                   // place in triangles_
   SampleBox drawn_{kTileSamples, kTileSamples, -1, -1};  // by opaque triangles
   std::vector<std::uint16_t> masks_;
   std::vector<LayerHit> hits_;
-  std::optional<TileTriangle> shown_;
-  std::uint32_t shown_index_ = 0;
 };
 
 }  // namespace
