@@ -144,7 +144,7 @@ Vec3<F> reflected_by_brdf(const SurfaceOf<F>& surface, Vec3f to_light, Vec3<F> t
 /// `same_normal`, where there is one, has been found with the same normal.
 template <Float F>
 LightingOf<F> lighting_of(const SurfaceOf<F>& s, Vec3<F> to_viewer, const RenderEnvironment& environment,
-                          const LightingOf<F>* same_normal) {
+                          const LightingOf<F>* same_normal = nullptr) {
   LightingOf<F> out;
   add_key(s, environment.key.towards, to_viewer, out);
   const F cosine = dot(s.normal, to_viewer);

@@ -1,4 +1,4 @@
-#include "stages/render/fragment_shader.h"
+#include "stages/render/lighting.h"
 
 #include <gtest/gtest.h>
 
@@ -11,7 +11,7 @@ namespace texmesh::brdf_test {
 constexpr double kTurn = 3.14159265358979323846;
 
 Vec3f radiance_towards(const LitSurface& surface, Vec3f to_viewer, const RenderEnvironment& environment) {
-  return radiance_of(surface, lighting_of(surface, to_viewer, environment, nullptr), environment);
+  return radiance_of(surface, lighting_of(surface, to_viewer, environment), environment);
 }
 
 Vec3f direction(double polar, double turn) {
@@ -136,6 +136,48 @@ TEST(Brdf, EmissionIsAdded) {
   s.emission = {0.1f, 0.2f, 0.3f};
   const Vec3f out = radiance_towards(s, {0, 0, 1}, testing::even_light({}));
   EXPECT_EQ(out, s.emission);
+}
+
+void set_lane(SurfaceOf<Lanes>& to, std::size_t lane, const LitSurface& s) {
+  for (const auto& [vec, from] : {std::pair{&to.normal, s.normal}, std::pair{&to.base_colour, s.base_colour},
+                                  std::pair{&to.emission, s.emission}})
+    vec->x[lane] = from.x, vec->y[lane] = from.y, vec->z[lane] = from.z;
+  to.metallic[lane] = s.metallic, to.roughness[lane] = s.roughness, to.occlusion[lane] = s.occlusion;
+}
+
+TEST(Brdf, EachLaneHasTheBitsOfASurfaceAlone) {
+  testing::Random random{1};
+  // Among others both ends of the range, which have rules of their own.
+  const auto part = [&] { return std::clamp(static_cast<float>(1.2 * random.uniform() - 0.1), 0.f, 1.f); };
+  const auto any_direction = [&] {
+    return direction(4 * static_cast<double>(part()), 7 * static_cast<double>(part()));
+  };
+  const RenderEnvironment lights[] = {studio_environment(), testing::only_key_light({0, 0, 1}, {9, 1, 0.1f}),
+                                      daylight_environment({1, 0, 0}, {0, 1, 0}, {0, 0, 1}, true)};
+  for (int round = 0; round < 500; ++round) {
+    const RenderEnvironment& light = lights[round % 3];
+    LitSurface alone[kLanes];
+    Vec3f viewer[kLanes];
+    SurfaceOf<Lanes> together;
+    Vec3<Lanes> viewers;
+    for (std::size_t i = 0; i < kLanes; ++i) {
+      alone[i] = {round % 7 == 0 && i == 0 ? Vec3f{} : any_direction(),
+                  {part(), part(), part()},
+                  {part(), 0, 0},
+                  part(),
+                  std::max(part(), kLeastRoughness),
+                  part()};
+      viewer[i] = any_direction();
+      set_lane(together, i, alone[i]);
+      viewers.x[i] = viewer[i].x, viewers.y[i] = viewer[i].y, viewers.z[i] = viewer[i].z;
+    }
+    const auto lighting = lighting_of(together, viewers, light);
+    const Vec3<Lanes> seen = tone_mapped_of(radiance_of(together, lighting, light));
+    for (std::size_t i = 0; i < kLanes; ++i)
+      EXPECT_EQ((Vec3f{seen.x[i], seen.y[i], seen.z[i]}),
+                tone_mapped_of(radiance_towards(alone[i], viewer[i], light)))
+          << round << ' ' << i;
+  }
 }
 
 TEST(Brdf, LightFromBehindDoesNotCount) {

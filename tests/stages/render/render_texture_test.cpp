@@ -36,7 +36,14 @@ TEST(RenderTexture, MathAgreesWithTheStandardLibrary) {
   for (float x = 1e-30f; x < 1e30f; x *= 1.37f) EXPECT_NEAR(log2_of(x), std::log2(x), 2e-5);
   for (float x = 0.5f; x < 2; x += 0.01f) EXPECT_NEAR(log2_of(x), std::log2(x), 1e-6);
   for (float x = -126; x < 126; x += 0.173f) EXPECT_NEAR(exp2_of(x) / std::exp2(x), 1, 3e-7);
-  EXPECT_EQ(exp2_of(std::numeric_limits<float>::quiet_NaN()), exp2_of(-126));
+  EXPECT_EQ(exp2_of(std::numeric_limits<float>::quiet_NaN()), exp2_of(-126.f));
+  for (float x = 1e-30f; x < 130; x *= 1.07f) {
+    const Lanes lanes{x, 2 * x, -x, x / 3}, raised = exp2_of(lanes), positive{x, 2 * x, x / 7, x / 3};
+    for (std::size_t i = 0; i < kLanes; ++i) {
+      EXPECT_EQ(raised[i], exp2_of(lanes[i]));
+      EXPECT_EQ(log2_of(positive)[i], log2_of(positive[i]));
+    }
+  }
 }
 
 TEST(RenderTexture, MipsOfNumbersAreRoundedMeans) {
