@@ -55,10 +55,7 @@ Container split_container(const Source& source, ByteSpan bytes) {
     source.fail("GLB header", "a file of " + std::to_string(length) + " bytes",
                 std::to_string(bytes.size()) + ": the file is cut off");
   }
-  if (length < bytes.size()) {
-    add_warning(source.notes, "trailing-bytes", "byte " + std::to_string(length),
-                "the file goes on after the end that its header declares");
-  }
+  tell_trailing_bytes(source.notes, bytes, length);
   bool has_json = false;
   for (std::size_t at = kHeaderBytes; at < length && !(has_json && c.bin);) {
     const std::string place = "GLB chunk at byte " + std::to_string(at);
