@@ -102,7 +102,7 @@ std::vector<std::string> worker_environment(bool large_pages) {
   return variables;
 }
 
-WorkerOrigin::WorkerOrigin(std::size_t workers) {
+WorkerOrigin::WorkerOrigin([[maybe_unused]] std::size_t workers) {
 #if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)  // they know no process that is a copy
   constexpr std::size_t kWorthCopying = 3;
   int ends[2];
