@@ -317,16 +317,19 @@ ArchiveFiles::ArchiveFiles(std::unique_ptr<ByteSource> source, std::uint64_t max
   if (const auto k = model_of_archive(files_, archive_)) model_ = files_[*k].name;
   folder_ = model_.substr(0, model_.rfind('/') + 1);
   for (std::size_t i = 0; i < files_.size(); ++i) {
-    const std::string &name = files_[i].name, &other = files_[i].other_name;
-    const std::string last = archived_name(name), other_last = archived_name(other);
-    by_name_.emplace(name, i);
+    by_name_.emplace(files_[i].name, i);
     if (files_[i].is_link) continue;
+    const std::string last = archived_name(files_[i].name);
     by_last_[last].push_back(i);
     by_last_key_[similar_key(last)].push_back(i);
     if (const std::string key = key_below(files_[i]); !key.empty()) by_key_[key].push_back(i);
-    if (other.empty()) continue;
+  }
+  for (std::size_t i = 0; i < files_.size(); ++i) {  // true names first
+    const std::string& other = files_[i].other_name;
+    if (other.empty() || files_[i].is_link) continue;
     by_name_.emplace(other, i);
-    if (other_last != last) by_last_[other_last].push_back(i);
+    if (const std::string last = archived_name(other); last != archived_name(files_[i].name))
+      by_last_[last].push_back(i);
   }
 }
 

@@ -136,6 +136,14 @@ TEST(Archive, NamesInAnyEncodingAreFound) {
     }
 }
 
+TEST(Archive, AnotherReadingOfANameNeverHidesAFile) {
+  const Bytes zip =
+      zip_of({{"a.obj", kObj}, {"\xe9.png", "Windows", false}, {"\xc3\xa9.png", "true", false}});
+  ArchiveFiles archive("a.zip", zip, 1 << 20);
+  const Bytes found = archive.read("\xc3\xa9.png", 100).value();
+  EXPECT_EQ(std::string(found.begin(), found.end()), "true");
+}
+
 TEST(Archive, ALinkIsNotFollowedAndIsTold) {
   const ZipFile mtl{"m.mtl", "newmtl m\nmap_Kd C.png\n"}, link{"C.png", "x/D.png", false, 0, ~0ull, 0120777};
   const Model m = import_zip({{"a.obj", kObj}, mtl, link, {"x/D.png", picture()}}).model;
