@@ -95,15 +95,6 @@ void drop_extras_and_nulls(GltfJson& value) {
   }
 }
 
-/// Brackets that open and commas: what JsonShape counts in a text, unless an object in it names a member
-/// twice.
-std::uint64_t values_in(const GltfJson& value) {
-  if (!value.is_structured()) return 0;
-  std::uint64_t sum = std::max<std::uint64_t>(value.size(), 1);
-  for (const GltfJson& child : value) sum += values_in(child);
-  return sum;
-}
-
 // The objects of a glTF with the members that are read: "!" must be there, "[]" is an array, "{}" an object
 // of any names, "@nodes" an index into the document's nodes, "*3" so many numbers, "," a choice.
 constexpr const char* kShapes = R"(
