@@ -223,7 +223,7 @@ struct TriangleTree::RayBundle {
       Lanes from{}, to = limit[g];
       for (int k = 0; k < 3; ++k) {
         const Lanes a = inverse[k][g] * low[k], b = inverse[k][g] * high[k];
-        const Lanes nearer = a < b ? a : b, farther = a < b ? b : a;
+        const Lanes nearer = a < b ? a : b, farther = a > b ? a : b;
         from = from > nearer ? from : nearer;
         to = to < farther ? to : farther;
       }
