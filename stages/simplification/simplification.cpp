@@ -203,7 +203,7 @@ class ErrorMeter {
     for (const Triangle& t : scale.triangles)
       limit[component_[mesh_.wedge_position[t[0]]]] = std::numeric_limits<double>::infinity();
     const auto there = distances(surface_.size(), [&](std::size_t i, Hint&) {
-      Hint hint = walk.from(surface_[i].position, surface_[i].point).hint;
+      Hint hint = walk.quick_from(surface_[i].position, surface_[i].point).hint;
       return coarse(surface_[i].point, hint);
     });
     const std::vector<SurfaceSample> samples =
