@@ -97,8 +97,7 @@ std::optional<StandardFiles> receive_files(int socket) {
 std::vector<std::string> worker_environment() {
   std::vector<std::string> variables;
   for (char** variable = environ; variable && *variable; ++variable) variables.emplace_back(*variable);
-  if (!::getenv("GLIBC_TUNABLES"))
-    variables.emplace_back("GLIBC_TUNABLES=glibc.malloc.hugetlb=1");
+  if (!::getenv("GLIBC_TUNABLES")) variables.emplace_back("GLIBC_TUNABLES=glibc.malloc.hugetlb=1");
   return variables;
 }
 
