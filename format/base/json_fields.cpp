@@ -75,9 +75,11 @@ static std::string line_and_column(std::span<const std::uint8_t> text, std::size
 }
 
 nlohmann::ordered_json parse_bounded_json(std::span<const std::uint8_t> bytes, const std::string& document,
-                                          int max_depth) {
+                                          int max_depth, std::uint64_t* values) {
   using Json = nlohmann::ordered_json;
-  if (scan_json_shape(bytes, max_depth).too_deep)
+  const JsonShape shape = scan_json_shape(bytes, max_depth);
+  if (values) *values = shape.values;
+  if (shape.too_deep)
     throw FormatError(document, "", "JSON at most " + std::to_string(max_depth) + " levels deep", "more");
   try {
     return Json::parse(bytes.begin(), bytes.end());
@@ -164,6 +166,13 @@ Json parse_json(std::span<const std::uint8_t> bytes, const std::string& file, st
   if (!json.is_object()) throw RuleError("J01", file, "/", "an object", json.type_name());
   check_integers(json, file);
   return json;
+}
+
+std::optional<std::string> repeated_name(std::span<const std::uint8_t> json) {
+  Json document;
+  NameWatcher watcher(document);
+  Json::sax_parse(json.begin(), json.end(), &watcher);
+  return watcher.repeated;
 }
 
 std::string dump_json(const nlohmann::ordered_json& json, const std::string& file) {

@@ -137,8 +137,13 @@ std::string package_of(const std::string& relative, PackageNames names) {
 class CollectionReader {
  public:
   CollectionReader(const std::string& file, const CompileOptions& base, const FolderLister& list_folder,
-                   PackageNames names, const NotesReader& read_notes)
-      : file_(file), list_folder_(list_folder), read_notes_(read_notes), names_(names), options_(base) {}
+                   PackageNames names, const NotesReader& read_notes, Notes* notes)
+      : file_(file),
+        list_folder_(list_folder),
+        read_notes_(read_notes),
+        names_(names),
+        options_(base),
+        notes_(notes) {}
 
   std::vector<CollectionModel> read(const Json& root) {
     check_members(root, "", {"$schema", "version", "options", "about", "patterns", "models", "folders"});
@@ -155,6 +160,10 @@ class CollectionReader {
         models.push_back(read_model(root["models"][i], "/models/" + std::to_string(i)));
     }
     if (has_folders) read_folders(root["folders"], models);
+    for (const Pattern& p : patterns_)
+      if (notes_ && !p.is_used)
+        notes_->push_back({Severity::kWarning, "unused-pattern", file_,
+                           p.place + "/match: no model's input matches \"" + p.match + "\""});
     return models;
   }
 
@@ -194,7 +203,9 @@ class CollectionReader {
     try {
       apply_profile(options, profile, file_);
     } catch (const InputError& e) {
-      throw InputError(file_, place + e.place(), e.expected(), e.found());
+      std::string within = e.place();
+      if (!within.starts_with('/')) within = "/" + within, std::ranges::replace(within, '.', '/');
+      throw InputError(file_, place + within, e.expected(), e.found());
     }
   }
 
@@ -208,7 +219,8 @@ class CollectionReader {
 
   void check_list(const Json& list, const std::string& place, const std::string& what) const {
     if (!list.is_array() || list.empty() || list.size() > kMaxModels)
-      fail(place, "a list of 1 to " + std::to_string(kMaxModels) + " " + what, list.type_name());
+      fail(place, "a list of 1 to " + std::to_string(kMaxModels) + " " + what,
+           list.is_array() ? std::to_string(list.size()) : list.type_name());
   }
 
   void read_patterns(const Json& root) {
@@ -221,7 +233,7 @@ class CollectionReader {
       if (!list[i].contains("match")) fail(place + "/match", "a pattern", "nothing");
       if (!list[i].contains("options") && !list[i].contains("about"))
         fail(place + "/options", "options or about", "nothing");
-      patterns_.push_back({path_at(list[i], "match", place), list[i], place});
+      patterns_.push_back({path_at(list[i], "match", place), list[i], place, false});
       CompileOptions check = options_;  // wrong options are an error even where nothing matches
       apply_members(check, list[i], place);
     }
@@ -230,7 +242,10 @@ class CollectionReader {
   /// Options of the models that the same patterns match, made once.
   std::shared_ptr<const CompileOptions> options_for(const std::string& input) {
     std::vector<bool> matches;
-    for (const Pattern& p : patterns_) matches.push_back(::fnmatch(p.match.c_str(), input.c_str(), 0) == 0);
+    for (Pattern& p : patterns_) {
+      matches.push_back(::fnmatch(p.match.c_str(), input.c_str(), 0) == 0);
+      p.is_used = p.is_used || matches.back();
+    }
     auto& shared = shared_[matches];
     if (!shared) {
       CompileOptions options = options_;
@@ -305,12 +320,14 @@ class CollectionReader {
     std::string match;
     Json json;  // with options or about
     std::string place;
+    bool is_used;
   };
   const std::string& file_;
   const FolderLister& list_folder_;
   const NotesReader& read_notes_;
   const PackageNames names_;
   CompileOptions options_;
+  Notes* const notes_;
   std::vector<Pattern> patterns_;
   std::map<std::vector<bool>, std::shared_ptr<const CompileOptions>> shared_;
   std::map<std::string, std::string> outputs_;  // by output_key(): the model's input
@@ -356,7 +373,7 @@ void add_collection(const std::string& file, const PlanRequest& request, const C
     return read_notes_file(plan.files.back(), plan.notes);
   };
   for (const CollectionModel& m : read_collection(std::string(bytes.begin(), bytes.end()), file, base, list,
-                                                  request.names, read_notes)) {
+                                                  request.names, read_notes, &plan.notes)) {
     const std::string input = (folder / m.input).string();
     plan.models.push_back({input, (fs::path(request.output) / m.output).string(), false, m.unread,
                            profiles.of(m.options), nullptr});
@@ -549,8 +566,9 @@ std::vector<ModelPath> find_models(const std::vector<std::string>& inputs, const
 
 std::vector<CollectionModel> read_collection(const std::string& json, const std::string& file_name,
                                              const CompileOptions& base, const FolderLister& list_folder,
-                                             PackageNames names, const NotesReader& read_notes) {
-  return CollectionReader(file_name, base, list_folder, names, read_notes)
+                                             PackageNames names, const NotesReader& read_notes,
+                                             Notes* notes) {
+  return CollectionReader(file_name, base, list_folder, names, read_notes, notes)
       .read(parse_document(text_bytes(json), kMaxFileBytes, 16, file_name));
 }
 

@@ -90,11 +90,11 @@ using NotesReader = std::function<std::string(const std::string& name)>;
 /// outputs named twice throw InputError{file_name, JSON pointer, ...}. `base` holds the options that the
 /// collection starts from (a profile). A model that is listed and found in a folder, too, is compiled
 /// once, as listed. Patterns are matched against the input as the collection writes it; `*` and `?` match
-/// "/" as well.
+/// "/" as well; `notes` get a word of those that match no model.
 std::vector<CollectionModel> read_collection(const std::string& json, const std::string& file_name,
                                              const CompileOptions& base, const FolderLister& list_folder = {},
                                              PackageNames names = PackageNames::kStem,
-                                             const NotesReader& read_notes = {});
+                                             const NotesReader& read_notes = {}, Notes* notes = nullptr);
 
 /// One model of a run.
 struct PlannedModel {

@@ -269,9 +269,12 @@ void apply_profile(CompileOptions& options, const Json& root, const std::string&
   std::vector<OptionField> fields = list_options(options);
   for (const auto& [stage, section] : root.items()) {
     if (stage == "version" || stage == "$schema") continue;
-    const bool known = std::any_of(fields.begin(), fields.end(),
-                                   [&s = stage](const OptionField& f) { return f.stage == s; });
-    if (!known) throw InputError(file_name, "/" + stage, "the name of a stage", "\"" + stage + "\"");
+    if (std::ranges::find(fields, stage, &OptionField::stage) == fields.end()) {
+      std::set<std::string> stages;
+      for (const OptionField& f : fields) stages.insert(f.stage);
+      throw InputError(file_name, "/" + stage, "the name of a stage",
+                       "\"" + stage + "\"" + meant_instead(stage, stages));
+    }
     if (!section.is_object()) throw InputError(file_name, "/" + stage, "an object", section.type_name());
     for (const auto& [name, value] : section.items()) {
       const std::string place = "/" + stage + "/" + name;

@@ -16,7 +16,7 @@
 
 namespace texmesh {
 
-inline constexpr int kImportVersion = 16;
+inline constexpr int kImportVersion = 17;
 
 enum class KdPolicy : std::uint8_t { kIgnore, kMultiply };
 template <>

@@ -118,7 +118,7 @@ std::string other_files(const std::vector<ArchivedFile>& files) {
     if (lower_extension(f.name) == "zip")
       return readable_name(f.name) + ", an archive in the archive: unpack the outer one and compile that";
   for (std::size_t k = 0; k < std::min(files.size(), kMostTold); ++k)
-    text += (k ? ", " : "") + readable_name(files[k].name);
+    text += (k ? ", " : "") + readable_name(files[k].name) + (files[k].is_link ? " (a symbolic link)" : "");
   if (files.size() > kMostTold) text += " and " + std::to_string(files.size() - kMostTold) + " more";
   return text.empty() ? "no file" : text + " alone";
 }

@@ -134,6 +134,8 @@ ImportedModel import_stl(const std::string& file_name, std::span<const std::uint
     mesh.triangles.push_back({index[i], index[i + 1], index[i + 2]});
   out.model.materials.push_back(scan_material("untextured"));
   finish_scan(out.model, file_name, options, context);
+  if (is_binary(bytes))
+    tell_trailing_bytes(out.model.notes, bytes, kStlHeaderBytes + kTriangleBytes * points.size() / 3);
   return out;
 }
 

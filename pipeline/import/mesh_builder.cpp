@@ -194,6 +194,13 @@ void count_lost(Lost& lost, const std::string& what, std::uint64_t count) {
   lost[lost.size() < kMostKinds || lost.contains(what) ? what : "others"] += count;
 }
 
+void tell_trailing_bytes(Notes& notes, std::span<const std::uint8_t> bytes, std::uint64_t end) {
+  const auto is_padding = [](std::uint8_t b) { return b == 0 || b == ' ' || (b >= '\t' && b <= '\r'); };
+  if (!std::ranges::all_of(bytes.subspan(end), is_padding))
+    add_warning(notes, "trailing-bytes", "byte " + std::to_string(end),
+                "the file goes on after the end that its header declares; the rest is not read");
+}
+
 Material scan_material(std::string name) {
   Material material;
   material.name = std::move(name);

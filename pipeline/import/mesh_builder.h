@@ -80,6 +80,9 @@ inline constexpr std::uint64_t kMaxEarWork = 400'000'000;  // about two seconds
 /// Counts what is left out. Strangers' files may have any number of kinds: those after the 32nd are "others".
 void count_lost(Lost& lost, const std::string& what, std::uint64_t count = 1);
 
+/// Warns ("trailing-bytes") of bytes behind the end that a file declares; blanks and zeros are padding.
+void tell_trailing_bytes(Notes& notes, std::span<const std::uint8_t> bytes, std::uint64_t end);
+
 /// Last step of the reader of glTF: drops triangles that refer to non-finite positions or UVs (warnings
 /// "non-finite-position", "non-finite-uv": such UVs become 0), unused images and materials; sets part names;
 /// checks the limits; throws InputError when no triangle is left.

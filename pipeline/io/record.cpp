@@ -249,7 +249,12 @@ Json parse_document(ByteSpan json, std::size_t most_bytes, int most_depth, const
     throw InputError(file, "", fmt::format("at most {} bytes of JSON", most_bytes),
                      std::to_string(json.size()));
   try {
-    return parse_bounded_json(json, file, most_depth);
+    std::uint64_t values = 0;
+    Json document = parse_bounded_json(json, file, most_depth, &values);
+    if (values_in(document) != values)
+      throw InputError(file, "", "every name of an object once",
+                       "\"" + repeated_name(json).value_or("") + "\" twice");
+    return document;
   } catch (const FormatError& e) {
     throw InputError(file, e.place(), e.expected(), e.found());
   }

@@ -377,7 +377,7 @@ std::string to_json_with_lines(const T& record, const char* list, const std::vec
 }
 
 /// JSON from outside. InputError {file, byte, expected, found} for more than `most_bytes` of it, for what
-/// nests deeper than `most_depth`, and for what is no JSON.
+/// nests deeper than `most_depth`, for a name that an object has twice, and for what is no JSON.
 Json parse_document(ByteSpan json, std::size_t most_bytes, int most_depth, const std::string& file);
 
 /// A record of JSON from outside. InputError {file, JSON pointer, expected, found}; `refuse_others`: also for

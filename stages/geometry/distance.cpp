@@ -197,6 +197,11 @@ double SurfaceDistance::distance2_to(std::uint32_t triangle, Vec3d p) const {
   return leaf_distance2(leaf_of_[triangle], p);
 }
 
+Vec3f SurfaceDistance::centre_of(std::uint32_t triangle) const {
+  const Vec3f* c = &corners_[3 * std::size_t{leaf_of_[triangle]}];
+  return (c[0] + c[1] + c[2]) * (1.0f / 3);
+}
+
 /// `best` is the square of an upper bound that triangle `leaf` gives.
 double SurfaceDistance::search(Vec3d p, double enough, double best, std::uint32_t& leaf) const {
   struct Open {
@@ -314,6 +319,18 @@ ScaleWalk::Guess ScaleWalk::from(std::uint32_t position, Vec3d point) const {
   }
   if (best.triangle != kNoIndex) best.hint = surface_.hint_of(best.triangle);
   return best;
+}
+
+ScaleWalk::Guess ScaleWalk::quick_from(std::uint32_t position, Vec3d point) const {
+  constexpr double kFar = std::numeric_limits<double>::infinity();
+  double nearest = kFar;
+  std::uint32_t triangle = kNoIndex;
+  for (const Spokes::Spoke& spoke : spokes_.at(nearest_corner(survivor_[position], point))) {
+    const Vec3d way = to_double(surface_.centre_of(spoke.triangle)) - point;
+    if (const double d = dot(way, way); d < nearest) nearest = d, triangle = spoke.triangle;
+  }
+  if (triangle == kNoIndex) return {kFar, kNoIndex, {}};
+  return {surface_.distance2_to(triangle, point), triangle, surface_.hint_of(triangle)};
 }
 
 }  // namespace texmesh

@@ -38,6 +38,7 @@ class SurfaceDistance {
   Hint nearer(Hint a, Hint b, Vec3d p) const;
   /// The square of the distance to that triangle alone: no less than that of the distance.
   double distance2_to(std::uint32_t triangle, Vec3d p) const;
+  Vec3f centre_of(std::uint32_t triangle) const;
 
  private:
   using Lanes = float __attribute__((vector_size(16)));
@@ -121,6 +122,9 @@ class ScaleWalk {
     SurfaceDistance::Hint hint;  // that triangle, or nothing
   };
   Guess from(std::uint32_t position, Vec3d point) const;
+  /// Of the triangles that from() compares only the one whose centre is nearest: no less than from(), mostly
+  /// the same, for a third of the time.
+  Guess quick_from(std::uint32_t position, Vec3d point) const;
 
  private:
   std::uint32_t nearest_corner(std::uint32_t from, Vec3d point) const;

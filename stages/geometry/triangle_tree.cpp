@@ -217,19 +217,19 @@ struct TriangleTree::RayBundle {
   /// A bit for each ray that may meet the box before what it has met.
   unsigned meets(const Box3d& box) const {
     const Vec3f low = to_float(box.min - origin), high = to_float(box.max - origin);
-    unsigned met = 0;
-    for (std::size_t g = 0; g < kGroups; ++g) {
+    using Flags = decltype(Lanes{} < Lanes{});
+    Flags met{}, bit{1, 2, 4, 8};
+    for (std::size_t g = 0; g < kGroups; ++g, bit <<= 4) {
       Lanes from{}, to = limit[g];
       for (int k = 0; k < 3; ++k) {
         const Lanes a = inverse[k][g] * low[k], b = inverse[k][g] * high[k];
-        const Lanes nearer = a < b ? a : b, farther = a < b ? b : a;
+        const Lanes nearer = a < b ? a : b, farther = a > b ? a : b;
         from = from > nearer ? from : nearer;
         to = to < farther ? to : farther;
       }
-      const auto yes = from * (1 - kSlack) <= to * (1 + kSlack) + touch;
-      for (std::size_t l = 0; l < 4; ++l) met |= (static_cast<unsigned>(yes[l]) & 1u) << (4 * g + l);
+      met |= (from * (1 - kSlack) <= to * (1 + kSlack) + touch) & bit;
     }
-    return met;
+    return static_cast<unsigned>(met[0] | met[1] | met[2] | met[3]);
   }
   void try_triangle(const std::array<Vec3d, 3>& corners, unsigned rays) {
     for (; rays != 0; rays &= rays - 1) {

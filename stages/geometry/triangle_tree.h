@@ -59,7 +59,7 @@ class QuadLine {
     for (std::size_t k = 0; k < 3; ++k) {
       const Lanes a = (quad.low[k] - from_low_[k]) * inverse_[k],
                   b = (quad.high[k] - from_high_[k]) * inverse_[k];
-      const Lanes nearer = a < b ? a : b, farther = a < b ? b : a;
+      const Lanes nearer = a < b ? a : b, farther = a > b ? a : b;
       from = from > nearer ? from : nearer;
       to = to < farther ? to : farther;
     }

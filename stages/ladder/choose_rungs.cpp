@@ -2,6 +2,7 @@
 // their bytes.
 #include "stages/ladder/choose_rungs.h"
 
+#include <bit>
 #include <map>
 
 #include "stages/base/parallel.h"
@@ -29,6 +30,19 @@ struct Window {
   std::uint64_t covered = 0;
 };
 
+std::uint64_t covered_texels(const TexturePlane& plane, const TexelRectangle& part) {
+  const CoverageMask mask(plane);
+  const std::uint32_t right = std::min(part.right_px(), plane.width_px);
+  std::uint64_t count = 0;
+  for (std::uint32_t v = part.top_px; v < std::min(part.bottom_px(), plane.height_px); ++v)
+    for (std::uint32_t u = part.left_px; u < right;) {
+      const bool eight = u % 8 == 0 && u + 8 <= right;
+      count += eight ? static_cast<std::uint64_t>(std::popcount(mask.byte_at(u, v))) : mask.covered(u, v);
+      u += eight ? 8 : 1;
+    }
+  return count;
+}
+
 /// Of the fragment's middle and corners, `inset` from its border, the one with most covered texels.
 Window window_in(const TexturePlane& plane, std::size_t fragment, std::uint32_t inset) {
   if (std::min(plane.fragment_width_px, plane.fragment_height_px) < 4 * inset) inset = 0;
@@ -40,8 +54,7 @@ Window window_in(const TexturePlane& plane, std::size_t fragment, std::uint32_t 
   for (const auto& [x, y] : {std::pair{right / 2, low / 2}, std::pair{0u, 0u}, std::pair{right, 0u},
                              std::pair{0u, low}, std::pair{right, low}}) {
     Window window{fragment, {whole.left_px + inset + x, whole.top_px + inset + y, w, h}, 0};
-    const std::vector<std::uint8_t> mask = coverage_samples(plane, window.rectangle);
-    window.covered = static_cast<std::uint64_t>(std::count(mask.begin(), mask.end(), 255));
+    window.covered = covered_texels(plane, window.rectangle);
     if (best.rectangle.width_px == 0 || window.covered > best.covered) best = window;
   }
   return best;

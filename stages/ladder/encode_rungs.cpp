@@ -482,8 +482,8 @@ SourceCodec make_source_codec(const TexturePlane& plane, const Pixels& pixels, c
   std::vector<int> below;
   if (!options.prune) below = asked_qualities(plane.role, options);
   const int top = std::max(quality_of(source->layout.quantisers[0]), below.empty() ? 1 : below.back() + 1);
-  out.bits = bits_by_quality(*source, top, quiet);
-  if (options.prune && !alone) below = qualities_by_bytes(out.bits, top);
+  if (!alone || !options.prune) out.bits = bits_by_quality(*source, top, quiet);
+  if (options.prune) below = qualities_by_bytes(out.bits, top);
   auto codec = std::make_unique<CoefficientCodec>(std::move(source));
   codec->add_standard_rungs(below, quiet);
   if (codec->add_top(top, quiet))

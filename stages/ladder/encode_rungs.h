@@ -11,7 +11,8 @@ struct SourceCodec {
   std::unique_ptr<TextureCodec> codec;  // of codec id jpeg; none: the plane is coded from its pixels
   std::string why_not;                  // of a JPEG without codec
   /// What a sample of the plane takes at each whole quality, [0..100], and at the top rung's what that takes;
-  /// 0 above it, and of data at most qualities. Empty for an empty sample.
+  /// 0 above it, and of data at most qualities. Empty for an empty sample,
+  /// and of a rung that is alone, which no other is compared with.
   std::vector<double> bits;
 };
 

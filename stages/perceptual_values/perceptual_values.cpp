@@ -29,6 +29,7 @@ class ScaleComparison {
       double most;
       std::uint32_t point;
       SurfaceDistance::Hint hint;
+      bool is_quick;
       bool operator<(const Candidate& o) const {
         return most < o.most || (most == o.most && point < o.point);
       }
@@ -36,17 +37,23 @@ class ScaleComparison {
     const auto divisor = [&](std::uint32_t p) { return relative ? points[p].radius : 1; };
     std::vector<Candidate> candidates;
     candidates.reserve(points.size());
-    for (std::uint32_t p = 0; p < points.size(); ++p) {
-      const ScaleWalk::Guess guess = walk_.from(points[p].position, points[p].at);
-      candidates.push_back({std::sqrt(guess.distance2) / divisor(p), p, guess.hint});
-    }
+    const auto candidate = [&](std::uint32_t p, const ScaleWalk::Guess& guess, bool is_quick) {
+      candidates.push_back({std::sqrt(guess.distance2) / divisor(p), p, guess.hint, is_quick});
+    };
+    for (std::uint32_t p = 0; p < points.size(); ++p)
+      candidate(p, walk_.quick_from(points[p].position, points[p].at), true);
     std::make_heap(candidates.begin(), candidates.end());
     count = std::min(count, points.size());
     std::vector<double> found;  // a heap, the least on top
     while (!candidates.empty() && (found.size() < count || candidates.front().most > found.front())) {
       std::pop_heap(candidates.begin(), candidates.end());
-      auto [most, p, hint] = candidates.back();
+      auto [most, p, hint, is_quick] = candidates.back();
       candidates.pop_back();
+      if (is_quick) {
+        candidate(p, walk_.from(points[p].position, points[p].at), false);
+        std::push_heap(candidates.begin(), candidates.end());
+        continue;
+      }
       found.push_back(surface_(points[p].at, hint) / divisor(p));
       std::push_heap(found.begin(), found.end(), std::greater<>());
       if (found.size() <= count) continue;

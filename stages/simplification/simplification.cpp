@@ -203,7 +203,7 @@ class ErrorMeter {
     for (const Triangle& t : scale.triangles)
       limit[component_[mesh_.wedge_position[t[0]]]] = std::numeric_limits<double>::infinity();
     const auto there = distances(surface_.size(), [&](std::size_t i, Hint&) {
-      Hint hint = walk.from(surface_[i].position, surface_[i].point).hint;
+      Hint hint = walk.quick_from(surface_[i].position, surface_[i].point).hint;
       return coarse(surface_[i].point, hint);
     });
     const std::vector<SurfaceSample> samples =
@@ -224,8 +224,9 @@ class ErrorMeter {
     scale.error_rms = static_cast<float>(std::sqrt(square / count));
     // A distance within the deviation so far changes neither number, so a bound of that distance is enough.
     const auto far = distances(vertices_.size(), [&](std::size_t i, Hint&) {
-      const double most = std::sqrt(walk.from(vertices_[i].position, vertices_[i].point).distance2);
-      return most <= deviation ? most : coarse(vertices_[i].point, deviation);
+      const auto& [point, component, position] = vertices_[i];
+      const double most = std::sqrt(walk.quick_from(position, point).distance2);
+      return most <= deviation ? most : coarse(point, deviation);
     });
     for (std::size_t i = 0; i < far.size(); ++i) {
       largest = std::max(largest, far[i]);

@@ -2,7 +2,10 @@
 #include <algorithm>
 
 #include "format/base/errors.h"
+#include "format/base/text_bytes.h"
+#include "pipeline/import/archive/archive_files.h"
 #include "pipeline/import/named_files.h"
+#include "pipeline/import/text_scan.h"
 #include "pipeline/io/file_resolver.h"
 #include "pipeline/io/uri.h"
 #include "tests/fuzz/fuzz_target.h"
@@ -95,7 +98,35 @@ bool read_name(ByteSpan input) {
   });
 }
 
+/// Names of an archive's files, one a line (@ before it: a link), a NUL, the name that is looked for. What
+/// the archive offers in its place is there.
+bool read_archived_name(ByteSpan input) {
+  constexpr std::size_t kMostFiles = 64;
+  const auto [names, wanted] = at_nul(input);
+  std::vector<testing::ZipFile> files{{"d/a.obj", "x", false}};
+  for (const std::string_view line : pieces_of(text_of(names), '\n')) {
+    const bool is_link = line.starts_with('@');
+    if (files.size() < kMostFiles)
+      files.push_back({std::string(line.substr(is_link)), "x", false, 0, ~0ull, is_link ? 0120777u : 0});
+  }
+  const Bytes zip = testing::zip_of(files);
+  return unless_input_error([&, w = wanted] {
+    ArchiveFiles archive("fuzz.zip", zip, 1 << 20);
+    const std::string name(w.begin(), w.end());
+    for (const std::string& other : archive.similar(name))
+      if (!archive.read(other, 1)) std::abort();
+    Notes notes;
+    find_file({name, "", false}, archive, 1, notes, "");
+  });
+}
+
 // ---- seeds
+
+std::vector<Bytes> archived_name_seeds() {
+  return {to_bytes("d/C.png\ne/c.PNG\n@c.png\0c.png"sv),
+          to_bytes("B\x81.png\nd/\x81/B\xfc.png\0b\xc3\xbc.jpg"sv),
+          to_bytes("d\\t\\x.png\n__MACOSX/._x.png\0..\\t\\x.png"sv)};
+}
 
 std::vector<Bytes> name_seeds() {
   return {to_bytes("\"C:\\scans\\a b.png\" # c"sv), to_bytes("../tex/./%2e%2e/scan%20a.jpg\0mats/m.mtl"sv),
@@ -150,8 +181,19 @@ std::vector<Bytes> ply_seeds() {
 
 std::vector<Bytes> archive_seeds() {
   const std::string obj = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
+  BytesOut path;  // the name in UTF-8 beside the one in other bytes
+  path.u16(0x7075);
+  path.u16(10);
+  path.u8(1);
+  path.u32(crc32_z(0, reinterpret_cast<const Bytef*>("?.mtl"), 5));
+  path.text("a.mtl");
+  const Bytes extra = path.finish();
   return {
       testing::zip_of({{"a.obj", obj, false}}),
+      testing::zip_of({{"a.obj", "mtllib A.mtl\nusemtl m\n" + obj, false},
+                       {"?.mtl", "newmtl m\nmap_Kd t\n", false, 0, ~0ull, 0, {extra.begin(), extra.end()}},
+                       {"x/\x81T", "x", false},
+                       {"t", "x/T", false, 0, ~0ull, 0120777}}),
       testing::zip_of({{"odm_textured_model_geo.obj", obj},
                        {"coords.txt", "WGS84 UTM 32N\n", false},
                        {"license.txt", "* title:\tA\n* license type:\tCC0-1.0 (https://a.b/)\n", false}})};
@@ -272,6 +314,7 @@ void add_scan_targets(std::vector<Target>& list) {
                            text_target("ply", read_ply, ply_seeds, kPlyWords),
                            text_target("name", read_name, name_seeds, kNameWords),
                            text_target("archive", read_archive, archive_seeds, kArchiveWords),
+                           text_target("archived_name", read_archived_name, archived_name_seeds, kNameWords),
                            text_target("stl", read_stl, stl_seeds, kStlWords),
                            text_target("range", read_range, range_seeds, kRangeWords),
                            text_target("cyberware", read_cyberware, cyberware_seeds, kCyberwareWords)});

@@ -14,6 +14,8 @@ struct ZipFile {
   bool deflated = true;
   int flags = 0;                        // 1 = encrypted
   std::uint64_t claimed_bytes = ~0ull;  // in the place of the true size
+  std::uint32_t mode = 0;               // of Unix: 0120777 = a symbolic link
+  std::string extra = "";               // of the directory
 };
 
 inline Bytes zip_of(const std::vector<ZipFile>& files) {
@@ -36,7 +38,7 @@ inline Bytes zip_of(const std::vector<ZipFile>& files) {
     const std::uint64_t bytes = f.claimed_bytes == ~0ull ? f.text.size() : f.claimed_bytes, at = out.size();
     const auto crc =
         crc32_z(crc32(0, nullptr, 0), reinterpret_cast<const Bytef*>(f.text.data()), f.text.size());
-    const auto common = [&](BytesOut& to) {
+    const auto common = [&](BytesOut& to, std::size_t extra) {
       to.u16(20);
       to.u16(static_cast<std::uint64_t>(f.flags));
       to.u16(f.deflated ? 8 : 0);
@@ -45,20 +47,20 @@ inline Bytes zip_of(const std::vector<ZipFile>& files) {
       to.u32(packed.size());
       to.u32(bytes);
       to.u16(f.name.size());
-      to.u16(0);
+      to.u16(extra);
     };
     out.u32(0x04034b50);
-    common(out);
+    common(out, 0);
     out.text(f.name);
     out.raw(packed);
     directory.u32(0x02014b50);
     directory.u16(20);
-    common(directory);
+    common(directory, f.extra.size());
     directory.u16(0);
     directory.u32(0);
-    directory.u32(0);
+    directory.u32(std::uint64_t{f.mode} << 16);
     directory.u32(at);
-    directory.text(f.name);
+    directory.text(f.name + f.extra);
   }
   const Bytes list = directory.finish();
   const std::size_t at = out.size();

@@ -109,7 +109,8 @@ ImportedModel import_file(const std::string& path, const ImportOptions& options,
 
 RenderedModel load_rendered_model(const std::string& path, const ImportOptions& options,
                                   const RunContext& context) {
-  return rendered_model(import_file(path, options, context), context);
+  ImportedModel imported = import_file(path, options, context);
+  return with_model_named(path, [&] { return rendered_model(std::move(imported), context); });
 }
 
 void make_unlit(RenderedModel& model) {

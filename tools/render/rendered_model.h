@@ -1,7 +1,10 @@
 #pragma once
 
+#include <filesystem>
+
 #include "delivery/cpp/package/package_reader.h"
 #include "pipeline/import/import.h"
+#include "pipeline/io/resolver.h"
 #include "stages/render/environment.h"
 #include "stages/render/render_texture.h"
 
@@ -43,6 +46,19 @@ RenderedModel rendered_model(ImportedModel imported, const RunContext& context);
 /// unpacked package also gets the package's previews ("../preview/PPP.jpg", beside a manifest). Errors as
 /// import_model(); ResourceError where the machine is to blame.
 ImportedModel import_file(const std::string& path, const ImportOptions& options, const RunContext& context);
+
+/// What `make` makes of that model's pictures. An InputError of a picture says the model's file first.
+template <class Make>
+auto with_model_named(const std::string& path, const Make& make) {
+  try {
+    return make();
+  } catch (const ResourceError&) {
+    throw;
+  } catch (const InputError& e) {
+    throw InputError(std::filesystem::path(path).filename().string(),
+                     e.file() + (e.place().empty() ? "" : ": " + e.place()), e.expected(), e.found());
+  }
+}
 
 /// Such a file for the renderer. Errors as import_file().
 RenderedModel load_rendered_model(const std::string& path, const ImportOptions& options,

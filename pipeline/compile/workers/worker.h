@@ -370,10 +370,9 @@ class WorkerOrigin {
   ~WorkerOrigin();
   WorkerOrigin(const WorkerOrigin&) = delete;
   WorkerOrigin& operator=(const WorkerOrigin&) = delete;
-  /// A worker that reads `input` as the whole of its standard input, in worker_environment(). One with large
-  /// pages, and all where the origin is gone, are started anew. Throws ResourceError where the system gives
-  /// no process or no files.
-  ChildProcess start(const std::string& input, bool large_pages);
+  /// A worker that reads `input` as the whole of its standard input, in worker_environment(). All where the
+  /// origin is gone are started anew. Throws ResourceError where the system gives no process or no files.
+  ChildProcess start(const std::string& input);
 
  private:
   pid_t copy(const std::array<int, 3>& files);
@@ -398,9 +397,10 @@ std::vector<WorkerReport> run_workers(const std::vector<WorkerJob>& jobs, const 
 /// Enters what an event says about the model into the report. False when the event is for the pool alone.
 bool apply_event(const WorkerEvent& event, double now_s, WorkerReport& report);
 
-/// This process's variables for a worker, as NAME=value. With `large_pages` glibc asks the system for large
-/// pages (2 MiB on x86-64), unless GLIBC_TUNABLES is set already.
-std::vector<std::string> worker_environment(bool large_pages);
+/// This process's variables for a worker, as NAME=value. In it glibc asks the system for large pages (2 MiB
+/// on x86-64), unless GLIBC_TUNABLES is set already: 2 % less time for small models, 4 % for 100,000
+/// triangles, and 2 to 6 % more memory.
+std::vector<std::string> worker_environment();
 
 /// The worker's side of compiling in child processes: reads a task from standard input, writes event lines to
 /// standard output, returns the exit code.

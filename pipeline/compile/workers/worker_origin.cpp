@@ -37,9 +37,9 @@ using StandardFiles = std::array<int, 3>;
 
 /// Starts texmesh with that only argument (posix_spawn, never a fork of a threaded parent); -1 in `files`
 /// leaves this process's. Throws ResourceError.
-pid_t start_texmesh(std::string argument, const StandardFiles& files, bool large_pages) {
+pid_t start_texmesh(std::string argument, const StandardFiles& files) {
   static const std::string executable = worker_executable();
-  std::vector<std::string> variables = worker_environment(large_pages);
+  std::vector<std::string> variables = worker_environment();
   std::vector<char*> environment;
   for (std::string& variable : variables) environment.push_back(variable.data());
   environment.push_back(nullptr);
@@ -94,22 +94,21 @@ std::optional<StandardFiles> receive_files(int socket) {
 
 }  // namespace
 
-std::vector<std::string> worker_environment(bool large_pages) {
+std::vector<std::string> worker_environment() {
   std::vector<std::string> variables;
   for (char** variable = environ; variable && *variable; ++variable) variables.emplace_back(*variable);
-  if (large_pages && !::getenv("GLIBC_TUNABLES"))
-    variables.emplace_back("GLIBC_TUNABLES=glibc.malloc.hugetlb=1");
+  if (!::getenv("GLIBC_TUNABLES")) variables.emplace_back("GLIBC_TUNABLES=glibc.malloc.hugetlb=1");
   return variables;
 }
 
-WorkerOrigin::WorkerOrigin(std::size_t workers) {
+WorkerOrigin::WorkerOrigin([[maybe_unused]] std::size_t workers) {
 #if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)  // they know no process that is a copy
   constexpr std::size_t kWorthCopying = 3;
   int ends[2];
   if (workers < kWorthCopying || ::socketpair(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0, ends) != 0) return;
   Descriptor here(ends[0]), there(ends[1]);
   try {
-    pid_ = start_texmesh("worker-origin", {there.get(), -1, -1}, false);
+    pid_ = start_texmesh("worker-origin", {there.get(), -1, -1});
     socket_ = here.release();
   } catch (const ResourceError&) {  // each worker is started anew
   }
@@ -132,12 +131,12 @@ pid_t WorkerOrigin::copy(const StandardFiles& files) {
   return pid;
 }
 
-ChildProcess WorkerOrigin::start(const std::string& input, bool large_pages) {
+ChildProcess WorkerOrigin::start(const std::string& input) {
   ChildProcess child;
   Pipe in, out, err;
   const StandardFiles files{in.read.get(), out.write.get(), err.write.get()};
-  if (!large_pages) child.pid = copy(files);
-  if (child.pid < 0) child.pid = start_texmesh("worker", files, large_pages);
+  child.pid = copy(files);
+  if (child.pid < 0) child.pid = start_texmesh("worker", files);
   for (Descriptor* const end : {&in.read, &out.write, &err.write}) end->reset();
   write_all(in.write.get(), text_bytes(input));  // a child that is gone says the rest by its exit status
   child.out = out.read.release();

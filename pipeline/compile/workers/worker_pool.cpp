@@ -40,11 +40,6 @@ void close_fd(int& fd) {
   fd = -1;
 }
 
-/// From here on a model gets large pages. Simplification of four million triangles takes a tenth less time
-/// with them, a whole compile of half a million up to 5 % less, and small models nothing but 2 to 6 % more
-/// memory.
-constexpr std::uint64_t kLargeModel_bytes = 1'000'000'000;
-
 volatile sig_atomic_t g_interrupted = 0;
 
 /// Catches SIGINT and SIGTERM while workers run and gives them back afterwards.
@@ -229,8 +224,7 @@ class WorkerPool {
     worker.job = index;
     worker.lane = free_lane();
     worker.temporary = job.output.empty() || job.forecast ? "" : temporary_name(job.output, index);
-    worker.process = origin_.start(to_json_line(task_of(job, worker.temporary, threads)),
-                                   job.predicted_memory_bytes >= kLargeModel_bytes);
+    worker.process = origin_.start(to_json_line(task_of(job, worker.temporary, threads)));
     reports_[index].lane = worker.lane;
     reports_[index].start_s = now_s();
     return worker;

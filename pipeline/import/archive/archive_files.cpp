@@ -68,16 +68,33 @@ DirectoryPlace find_directory(ByteSource& archive) {
   refuse_archive(archive, place, "a whole ZIP archive", "no directory: the archive is cut");
 }
 
-/// Sizes and the place of a file of 4 GiB and more.
-void read_zip64(BytesIn extra, ArchivedFile& file) {
+/// Sizes and the place of a file of 4 GiB and more, and the name in UTF-8 beside `name` in other bytes.
+void read_extra(BytesIn extra, std::string& name, ArchivedFile& file) {
+  constexpr std::uint16_t kZip64 = 1, kUnicodePath = 0x7075;
   while (extra.left() >= 4) {
     const std::uint16_t id = extra.u16(), bytes = extra.u16();
     if (bytes > extra.left()) return;
     BytesIn field(extra.raw(bytes), "");
-    if (id != 1) continue;
+    if (id == kUnicodePath && bytes > 5 && field.u8() == 1 && field.u32() == crc_of(text_bytes(name)))
+      name = text_of(field.raw(field.left()));
+    if (id != kZip64) continue;
     for (std::uint64_t* number : {&file.bytes, &file.packed_bytes, &file.header})
       if (*number == 0xffffffff && field.left() >= 8) *number = field.u64();
   }
+}
+
+/// A name that is no UTF-8, in code page 850, as programs of Windows write it. The standard's code page 437
+/// has the same letters of French, German and Spanish, and frames where 850 has the other letters.
+std::string oem_text(const std::string& name) {
+  static constexpr char16_t kFrom0x80[] =
+      u"ÇüéâäàåçêëèïîìÄÅÉæÆôöòûùÿÖÜø£Ø×ƒáíóúñÑªº¿®¬½¼¡«»░▒▓│┤ÁÂÀ©╣║╗╝¢¥┐└┴┬├─┼ãÃ╚╔╩╦╠═╬¤ðÐÊËÈıÍÎÏ┘┌█▄¦Ì▀"
+      u"ÓßÔÒõÕµþÞÚÛÙýÝ¯´\u00ad±‗¾¶§÷¸°¨·¹³²■\u00a0";
+  std::string text;
+  for (const char byte : name) {
+    const auto c = static_cast<unsigned char>(byte);
+    append_utf8(text, c < 0x80 ? char32_t{c} : char32_t{kFrom0x80[c - 0x80]});
+  }
+  return text;
 }
 
 bool leaves_archive(const std::string& name) {
@@ -92,6 +109,15 @@ bool is_addition_of_macos(const std::string& name) {
          archived_name(name).starts_with("._") || archived_name(name) == ".DS_Store";
 }
 
+/// The names, with slashes. InputError for those that lead out of the archive.
+void set_names(ByteSource& archive, const std::string& name, ArchivedFile& file) {
+  file.name = is_utf8(name) ? name : oem_text(name);
+  if (!is_utf8(name)) file.other_name = utf8_of(name);
+  for (std::string* text : {&file.name, &file.other_name}) std::ranges::replace(*text, '\\', '/');
+  if (leaves_archive(file.name))
+    refuse_archive(archive, "directory", "names within the archive", readable_name(file.name));
+}
+
 /// The next file of the directory; one without a name is none to read.
 ArchivedFile next_file(ByteSource& archive, BytesIn& in) {
   if (in.left() < kCentralBytes || in.u32() != kCentralMark)
@@ -104,24 +130,22 @@ ArchivedFile next_file(ByteSource& archive, BytesIn& in) {
   file.crc32 = in.u32();
   file.packed_bytes = in.u32();
   file.bytes = in.u32();
-  const std::uint16_t name = in.u16(), extra = in.u16(), comment = in.u16();
+  const std::uint16_t name_bytes = in.u16(), extra = in.u16(), comment = in.u16();
   in.raw(4);
   const std::uint32_t attributes = in.u32();
   file.header = in.u32();
-  if (std::uint64_t{name} + extra + comment > in.left())
+  if (std::uint64_t{name_bytes} + extra + comment > in.left())
     refuse_archive(archive, "directory", "an entry for each file", "one that is cut");
-  file.name = utf8_of(in.text(name));
-  read_zip64(BytesIn(in.raw(extra), ""), file);
+  std::string name(in.text(name_bytes));
+  read_extra(BytesIn(in.raw(extra), ""), name, file);
   in.raw(comment);
-  std::ranges::replace(file.name, '\\', '/');
-  if (leaves_archive(file.name))
-    refuse_archive(archive, "directory", "names within the archive", readable_name(file.name));
+  set_names(archive, name, file);
   constexpr std::uint16_t kEncrypted = 1 | 1 << 6 | 1 << 13;
   if (flags & kEncrypted)
     refuse_archive(archive, readable_name(file.name), "an archive without a password", "an encrypted file");
   constexpr std::uint32_t kTypeMask = 0170000, kLink = 0120000;
-  const bool link = (attributes >> 16 & kTypeMask) == kLink;
-  if (link || file.name.ends_with('/') || is_addition_of_macos(file.name)) file.name.clear();
+  file.is_link = (attributes >> 16 & kTypeMask) == kLink;
+  if (file.name.ends_with('/') || is_addition_of_macos(file.name)) file.name.clear();
   return file;
 }
 
@@ -168,7 +192,7 @@ constexpr std::uint64_t kMaxTextBytes = 65'536;
 const ArchivedFile* least_deep(const ArchiveFiles& archive, std::uint64_t max_bytes, const auto& wanted) {
   const ArchivedFile* found = nullptr;
   for (const ArchivedFile& f : archive.files())
-    if (wanted(lower(f.name.substr(f.name.rfind('/') + 1))) && f.bytes <= max_bytes &&
+    if (!f.is_link && f.bytes <= max_bytes && wanted(lower(archived_name(f.name))) &&
         (!found || std::ranges::count(f.name, '/') < std::ranges::count(found->name, '/')))
       found = &f;
   return found;
@@ -261,7 +285,7 @@ std::optional<std::size_t> model_of_archive(const std::vector<ArchivedFile>& fil
   for (std::size_t k = 0; k < files.size(); ++k) {
     const std::string name = lower(files[k].name);
     const auto* ending = std::ranges::find(kEndings, lower_ending(name));
-    if (ending == std::end(kEndings)) continue;
+    if (ending == std::end(kEndings) || files[k].is_link) continue;
     const Rank rank{archived_name(name) != "scene.gltf", ending - kEndings, std::ranges::count(name, '/'),
                     name.find("odm_textured_model_geo.") == name.npos};
     several = least == rank || (several && least < rank);
@@ -293,11 +317,19 @@ ArchiveFiles::ArchiveFiles(std::unique_ptr<ByteSource> source, std::uint64_t max
   if (const auto k = model_of_archive(files_, archive_)) model_ = files_[*k].name;
   folder_ = model_.substr(0, model_.rfind('/') + 1);
   for (std::size_t i = 0; i < files_.size(); ++i) {
-    const std::string last = archived_name(files_[i].name);
     by_name_.emplace(files_[i].name, i);
+    if (files_[i].is_link) continue;
+    const std::string last = archived_name(files_[i].name);
     by_last_[last].push_back(i);
     by_last_key_[similar_key(last)].push_back(i);
     if (const std::string key = key_below(files_[i]); !key.empty()) by_key_[key].push_back(i);
+  }
+  for (std::size_t i = 0; i < files_.size(); ++i) {  // true names first
+    const std::string& other = files_[i].other_name;
+    if (other.empty() || files_[i].is_link) continue;
+    by_name_.emplace(other, i);
+    if (const std::string last = archived_name(other); last != archived_name(files_[i].name))
+      by_last_[last].push_back(i);
   }
 }
 
@@ -328,12 +360,17 @@ Bytes ArchiveFiles::unpacked(const ArchivedFile& file, std::uint64_t max_bytes) 
 }
 
 std::optional<Bytes> ArchiveFiles::read(const std::string& uri, std::uint64_t max_bytes) {
+  bool is_link = false;
   for (const std::string& whole : {folder_ + uri, uri})
-    if (const auto exact = by_name_.find(whole); exact != by_name_.end())
-      return unpacked(files_[exact->second], max_bytes);
+    if (const auto exact = by_name_.find(whole); exact != by_name_.end()) {
+      if (!files_[exact->second].is_link) return unpacked(files_[exact->second], max_bytes);
+      is_link = true;
+    }
   const auto only = by_last_.find(archived_name(uri));
-  if (only == by_last_.end() || only->second.size() > 1) return std::nullopt;
-  return unpacked(files_[only->second[0]], max_bytes);
+  if (only != by_last_.end() && only->second.size() == 1) return unpacked(files_[only->second[0]], max_bytes);
+  if (is_link)
+    throw FileRefused(uri, "", "a regular file", "a symbolic link; unpack the archive to follow it");
+  return std::nullopt;
 }
 
 std::string ArchiveFiles::key_below(const ArchivedFile& f) const {

@@ -16,7 +16,9 @@ inline constexpr std::uint64_t kAnyArchiveSize = std::uint64_t{1} << 62;
 
 /// A file of a ZIP archive.
 struct ArchivedFile {
-  std::string name;  // relative to the archive, slashes, UTF-8
+  std::string name;        // relative to the archive, slashes, UTF-8
+  std::string other_name;  // of a name that was no UTF-8: as if it were Windows-1252
+  bool is_link = false;    // a symbolic link, which is not followed
   std::uint64_t header = 0, packed_bytes = 0, bytes = 0;
   std::uint32_t crc32 = 0;
   std::uint16_t method = 0;

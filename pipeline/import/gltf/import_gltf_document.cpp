@@ -55,10 +55,7 @@ Container split_container(const Source& source, ByteSpan bytes) {
     source.fail("GLB header", "a file of " + std::to_string(length) + " bytes",
                 std::to_string(bytes.size()) + ": the file is cut off");
   }
-  if (length < bytes.size()) {
-    add_warning(source.notes, "trailing-bytes", "byte " + std::to_string(length),
-                "the file goes on after the end that its header declares");
-  }
+  tell_trailing_bytes(source.notes, bytes, length);
   bool has_json = false;
   for (std::size_t at = kHeaderBytes; at < length && !(has_json && c.bin);) {
     const std::string place = "GLB chunk at byte " + std::to_string(at);
@@ -96,15 +93,6 @@ void drop_extras_and_nulls(GltfJson& value) {
   if (value.is_structured()) {
     for (GltfJson& child : value) drop_extras_and_nulls(child);
   }
-}
-
-/// Brackets that open and commas: what JsonShape counts in a text, unless an object in it names a member
-/// twice.
-std::uint64_t values_in(const GltfJson& value) {
-  if (!value.is_structured()) return 0;
-  std::uint64_t sum = std::max<std::uint64_t>(value.size(), 1);
-  for (const GltfJson& child : value) sum += values_in(child);
-  return sum;
 }
 
 // The objects of a glTF with the members that are read: "!" must be there, "[]" is an array, "{}" an object

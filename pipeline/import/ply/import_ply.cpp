@@ -51,6 +51,7 @@ struct PlySurface {
   // Faults that are passed over, with their numbers:
   std::uint64_t long_lines = 0, odd_texcoords = 0;
   std::string first_long_line;  // where it stands
+  std::size_t end = 0;          // of the last row that the header declares
 };
 
 double scale_of_type(PlyType type) {
@@ -160,6 +161,7 @@ class SurfaceReader {
                        std::string(is_splats_ ? "none (Gaussian splats: " : "none (a point cloud of ") +
                            std::to_string(surface_.vertices.positions.size()) + " points)");
     check_face_count();
+    surface_.end = rows_.end();
     surface_.comments = std::move(header_.comments);
     return std::move(surface_);
   }
@@ -514,6 +516,9 @@ class PlyModel {
     std::vector<std::int32_t>& numbers = surface_.faces.texture;
     const auto beyond = std::ranges::count_if(numbers, [this](std::int32_t t) { return is_beyond(t); });
     const std::size_t textures = model_.materials.size() - 1;
+    if (numbers.empty() && textures > 1 && has_uv())
+      add_warning(model_.notes, "odd-texture-number", "element face",
+                  "without a texnumber the first of the " + std::to_string(textures) + " textures is taken");
     if (beyond == 0 || textures == 0) return;
     const std::set<std::int32_t> all(numbers.begin(), numbers.end());
     const bool is_only = textures == 1 && all.size() == 1;
@@ -628,12 +633,14 @@ ImportedModel import_ply(const std::string& file_name, std::span<const std::uint
                          Resolver& resolver, const ImportOptions& options, const RunContext& context) {
   ImportedModel out;
   PlySurface surface = SurfaceReader(file_name, bytes, options, context).read();
+  const std::size_t end = surface.end;
   out.format = "ply";
   Notes notes;
   out.lost = std::move(surface.lost);
   for (std::string& comment : surface.comments) comment = source_text(comment, file_name, notes);
   out.about = about_from_comments(surface.comments, out.format, notes);
   out.model = PlyModel(file_name, std::move(surface), resolver, options, context).build(out.lost);
+  tell_trailing_bytes(notes, bytes, end);
   out.model.notes.insert(out.model.notes.end(), notes.begin(), notes.end());
   return out;
 }

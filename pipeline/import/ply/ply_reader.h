@@ -59,6 +59,8 @@ class PlyRows {
   /// what a line has too many is `extra`. Throws InputError at the end of the data and for anything that
   /// is no number.
   void next(PlyRow& row);
+  /// Where the last row that was read ends.
+  std::size_t end() const { return bytes_.size() - left(); }
   /// "vertex 17 (line 29)" or "vertex 17 (byte 812)".
   std::string place() const;
 

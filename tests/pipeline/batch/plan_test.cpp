@@ -77,6 +77,34 @@ TEST(Collection, TheSamePackageTwiceAndWrongOptionsAreRefusedWithTheirPlace) {
             "/patterns/0/options/ssf/scales");
   EXPECT_EQ(place_of(R"({"version":1,"models":[{"input":"a.obj","output":"../a.texmesh"}]})"),
             "/models/0/output");
+  EXPECT_EQ(place_of(R"({"version":1,"models":[{"input":"a.obj","options":{"ladder":{"rungs":[5,3]}}}]})"),
+            "/models/0/options/ladder/rungs");
+}
+
+TEST(Collection, WhatIsFoundIsTold) {
+  const auto found_in = [](const std::string& json) -> std::string {
+    try {
+      read(json);
+    } catch (const InputError& e) {
+      return e.found();
+    }
+    return "accepted";
+  };
+  EXPECT_EQ(found_in(R"({"version":1,"models":[]})"), "0");
+  EXPECT_EQ(found_in(R"({"version":1,"models":{}})"), "object");
+  EXPECT_EQ(found_in(R"({"version":1,"options":{"lader":{}},"models":[{"input":"a.obj"}]})"),
+            "\"lader\"; did you mean ladder?");
+}
+
+TEST(Collection, APatternThatMatchesNoModelIsTold) {
+  Notes notes;
+  read_collection(R"({"version":1,"patterns":[{"match":"*.obj","options":{}},{"match":"*.objj","options":{}}],
+                      "models":[{"input":"a.obj"}]})",
+                  "c.json", {}, {}, PackageNames::kStem, {}, &notes);
+  ASSERT_EQ(notes.size(), 1u);
+  EXPECT_EQ(notes[0].severity, Severity::kWarning);
+  EXPECT_EQ(notes[0].place, "c.json");
+  EXPECT_EQ(notes[0].text, "/patterns/1/match: no model's input matches \"*.objj\"");
 }
 
 TEST(Collection, PathsWithControlCharactersAreRefused) {

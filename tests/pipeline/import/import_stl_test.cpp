@@ -77,10 +77,20 @@ TEST(ImportStl, WhatHasNoColourIsGreyAndSaysSo) {
   EXPECT_EQ(count_notes(model, "no-colour"), 1);
 }
 
-TEST(ImportStl, BytesBehindTheTrianglesAreTolerated) {
+TEST(ImportStl, BytesBehindTheTrianglesAreTold) {
   Bytes bytes = binary_stl(kTetrahedron);
+  bytes.push_back(0);
+  EXPECT_EQ(count_notes(import(bytes).model, "trailing-bytes"), 0) << "padding";
   bytes.push_back(7);
-  expect_tetrahedron(import(bytes));
+  const ImportedModel more = import(bytes);
+  expect_tetrahedron(more);
+  EXPECT_EQ(count_notes(more.model, "trailing-bytes"), 1);
+  EXPECT_EQ(count_notes(more.model, "no-colour"), 1);
+  bytes = binary_stl(kTetrahedron);
+  bytes[80] = 2;  // the count of an exporter that did not know it
+  const Model half = import(bytes).model;
+  EXPECT_EQ(half.mesh.triangles.size(), 2u);
+  EXPECT_EQ(half.notes.at(1).place, "byte 184");
 }
 
 TEST(ImportStl, EveryTruncationIsAnError) {

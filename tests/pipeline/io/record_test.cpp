@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "format/base/errors.h"
+#include "format/base/text_bytes.h"
 
 namespace texmesh::record_test {
 
@@ -131,6 +132,19 @@ TEST(Record, ASyntaxErrorHasItsLineAndColumn) {
   } catch (const InputError& e) {
     EXPECT_EQ(e.place(), "line 3, column 7");
   }
+}
+
+TEST(Record, ANameTwiceIsRefused) {
+  const auto found = [](const std::string& text) -> std::string {
+    try {
+      parse_document(text_bytes(text), 1000, 8, "a.json");
+    } catch (const InputError& e) {
+      return e.found();
+    }
+    return "read";
+  };
+  EXPECT_EQ(found(R"({"a":[{},[],{"b":"{,","c":[{}]}],"b":1})"), "read");
+  EXPECT_EQ(found(R"({"a":[{"b":1,"c":2,"b":3}]})"), "\"b\" twice");
 }
 
 TEST(Record, HasASchema) {

@@ -88,14 +88,18 @@ TEST(ScaleWalk, GuessesBoundTheDistanceAndMostAreIt) {
     const SurfaceDistance surface(scales.mesh.positions, scales.mesh.wedge_position, scale.triangles);
     const auto survivor = survivors(scales.mesh.positions.size(), scales.collapses, scale.collapse_count);
     const ScaleWalk walk(scales.mesh, scale.triangles, survivor, surface);
-    std::size_t right = 0;
+    std::size_t right = 0, quick_right = 0;
     for (std::uint32_t p = 0; p < scales.mesh.positions.size(); ++p) {
       const Vec3d at = to_double(scales.mesh.positions[p]);
       const double guess = std::sqrt(walk.from(p, at).distance2), distance = surface(at);
       EXPECT_GE(guess, distance - 1e-9);
       right += guess <= distance + 1e-9;
+      const double quick = std::sqrt(walk.quick_from(p, at).distance2);
+      EXPECT_GE(quick, guess);
+      quick_right += quick <= guess + 1e-9;
     }
     EXPECT_GT(static_cast<double>(right), 0.8 * static_cast<double>(scales.mesh.positions.size())) << k;
+    EXPECT_GT(static_cast<double>(quick_right), 0.5 * static_cast<double>(scales.mesh.positions.size())) << k;
   }
 }
 

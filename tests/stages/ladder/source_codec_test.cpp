@@ -172,6 +172,8 @@ TEST(SourceCodec, ChosenQualitiesAreByBytes) {
   EXPECT_EQ(rungs.back().quality, 95);
   const SourceCodec alone = make_source_codec(scene.plane(), scene.pixels[0], scene.image, {}, true, {});
   EXPECT_EQ(alone.codec->train({}, {}).size(), 1u);
+  EXPECT_FALSE(source.bits.empty());
+  EXPECT_TRUE(alone.bits.empty()) << "measured for nothing";
   std::vector<Bytes> streams(rungs.size());
   const auto encoder = source.codec->encoder();
   const Pixels& pixels = scene.pixels[0];

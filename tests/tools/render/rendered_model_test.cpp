@@ -5,6 +5,7 @@
 
 #include <algorithm>
 
+#include "tests/support/command.h"
 #include "tests/support/gltf_builder.h"
 #include "tests/support/images.h"
 #include "tests/support/meshes.h"
@@ -152,6 +153,17 @@ TEST(RenderedModel, AnImageThatDoesNotDecodeIsTheModelsFault) {
   Image broken = png_image(8, 3);
   broken.bytes.resize(broken.bytes.size() / 2);
   EXPECT_THROW(rendered_model(sphere_model({a}, {broken}), {}), InputError);
+  TemporaryFolder folder;
+  write_text(folder / "a.mtl", "newmtl m\nmap_Kd t.png\n");
+  write_text(folder / "a.obj", "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nusemtl m\nf 1/1 2/1 3/1\n");
+  write_text(folder / "t.png", {broken.bytes.begin(), broken.bytes.end()});
+  try {
+    load_rendered_model(folder / "a.obj", {}, {});
+    FAIL();
+  } catch (const InputError& e) {
+    EXPECT_EQ(e.file(), "a.obj");
+    EXPECT_TRUE(e.place().starts_with("t.png: row ")) << e.place();
+  }
 }
 
 }  // namespace texmesh::testing::rendered_model_test

@@ -261,7 +261,8 @@ AtlasSubject atlas_subject(Model model, const RunContext& context) {
 }
 
 AtlasSubject atlas_subject(const std::string& path, const RunContext& context) {
-  return atlas_subject(import_file(path, {}, context).model, context);
+  ImportedModel imported = import_file(path, {}, context);
+  return with_model_named(path, [&] { return atlas_subject(std::move(imported.model), context); });
 }
 
 AtlasSubject atlas_subject(PackageReader& package, const RunContext& context) {

@@ -18,8 +18,6 @@ namespace fs = std::filesystem;
 /// let a copy of this one run.
 TEST(WorkerPool, DISABLED_PrintWhatWorkersGet) {
   std::vector<WorkerJob> jobs(3);
-  jobs[1].predicted_memory_bytes = 999'999'999;
-  jobs[2].predicted_memory_bytes = 1'000'000'000;
   for (WorkerJob& job : jobs) job.profile = std::make_shared<const std::string>("{}");
   for (const WorkerReport& report : run_workers(jobs, {}, {}, {}))
     std::printf("worker: %s\n", report.more->error.found.c_str());
@@ -38,8 +36,7 @@ testing::CommandResult run_copy(const std::string& test, const std::string& scri
   return r;
 }
 
-/// Of workers that are predicted to need nothing known, a little less than 1 GB, and 1 GB: what they have for
-/// GLIBC_TUNABLES when the pool has `environment` beside this test's variables.
+/// What three workers have for GLIBC_TUNABLES when the pool has `environment` beside this test's variables.
 std::vector<std::string> tunables_of_workers(const std::vector<std::string>& environment) {
   const testing::CommandResult r =
       run_copy("PrintWhatWorkersGet", "echo \"<${GLIBC_TUNABLES-none}>\" >&2\nexit 1", environment);
@@ -49,9 +46,9 @@ std::vector<std::string> tunables_of_workers(const std::vector<std::string>& env
   return out;
 }
 
-TEST(WorkerPool, AWorkerOfALargeModelHasLargePages) {
+TEST(WorkerPool, WorkersHaveLargePages) {
   ::unsetenv("GLIBC_TUNABLES");
-  EXPECT_EQ(tunables_of_workers({}), (std::vector<std::string>{"none", "none", "glibc.malloc.hugetlb=1"}));
+  EXPECT_EQ(tunables_of_workers({}), std::vector<std::string>(3, "glibc.malloc.hugetlb=1"));
 }
 
 TEST(WorkerPool, WorkersKeepTheUsersSettingOfMemory) {

@@ -112,6 +112,50 @@ TEST(Archive, ThousandsOfNamesAmongThousandsOfFilesTakeNoTime) {
   EXPECT_LT(told->text.size(), 600u) << "not all 2,000";
 }
 
+TEST(Archive, NamesInAnyEncodingAreFound) {
+  // "Büste Ä.png" by programs of Windows, by others, and with the name in UTF-8 beside it.
+  const std::string utf8 = "B\xc3\xbcste \xc3\x84.png", oem = "B\x81ste \x8e.png",
+                    latin = "B\xfcste \xc4.png";
+  const auto with_path = [](const std::string& name, const std::string& path) {
+    BytesOut extra;
+    extra.u16(0x7075);
+    extra.u16(5 + path.size());
+    extra.u8(1);
+    extra.u32(crc32_z(0, reinterpret_cast<const Bytef*>(name.data()), name.size()));
+    extra.text(path);
+    const Bytes bytes = extra.finish();
+    return ZipFile{name, picture(), true, 0, ~0ull, 0, {bytes.begin(), bytes.end()}};
+  };
+  for (const ZipFile& file : {ZipFile{utf8, picture()}, ZipFile{oem, picture()}, ZipFile{latin, picture()},
+                              ZipFile{"t/" + oem, picture()}, ZipFile{"\x81/" + oem, picture()},
+                              with_path("B?ste ?.png", utf8), with_path(oem, utf8)})
+    for (const std::string& written : {utf8, latin}) {
+      const Model m =
+          import_zip({{"a.obj", kObj}, {"m.mtl", "newmtl m\nmap_Kd " + written + "\n"}, file}).model;
+      EXPECT_EQ(m.images.size(), 1u) << readable_name(file.name) << " as " << readable_name(written);
+    }
+}
+
+TEST(Archive, AnotherReadingOfANameNeverHidesAFile) {
+  const Bytes zip =
+      zip_of({{"a.obj", kObj}, {"\xe9.png", "Windows", false}, {"\xc3\xa9.png", "true", false}});
+  ArchiveFiles archive("a.zip", zip, 1 << 20);
+  const Bytes found = archive.read("\xc3\xa9.png", 100).value();
+  EXPECT_EQ(std::string(found.begin(), found.end()), "true");
+}
+
+TEST(Archive, ALinkIsNotFollowedAndIsTold) {
+  const ZipFile mtl{"m.mtl", "newmtl m\nmap_Kd C.png\n"}, link{"C.png", "x/D.png", false, 0, ~0ull, 0120777};
+  const Model m = import_zip({{"a.obj", kObj}, mtl, link, {"x/D.png", picture()}}).model;
+  const auto told = std::ranges::find(m.notes, "missing-texture", &Note::code);
+  ASSERT_NE(told, m.notes.end());
+  EXPECT_TRUE(has(told->text, "a symbolic link; unpack the archive")) << told->text;
+  EXPECT_EQ(import_zip({{"a.obj", kObj}, mtl, link, {"x/C.png", picture()}}).model.images.size(), 1u)
+      << "the one file of this last part";
+  const std::string alone = refusal_of({{"a.obj", "b/c", false, 0, ~0ull, 0120777}, {"b/c", kObj}});
+  EXPECT_TRUE(has(alone, "found a.obj (a symbolic link), b/c alone")) << alone;
+}
+
 TEST(Archive, WhatAnArchiveHasInThePlaceOfAModelIsTold) {
   EXPECT_TRUE(has(refusal_of({{"a.fbx", "x"}, {"b.png", "x"}, {"c", "x"}, {"d", "x"}}),
                   "found a.fbx, b.png, c and 1 more alone"));

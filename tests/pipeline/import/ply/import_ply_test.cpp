@@ -226,6 +226,30 @@ TEST(ImportPly, SeveralTexturesAndMissingOnes) {
   EXPECT_FALSE(m.materials[m.mesh.triangle_material[2]].base_colour_texture.used());
 }
 
+TEST(ImportPly, TexturesThatNoFaceChoosesAreTold) {
+  std::string text = kSquare;
+  text.replace(text.find("comment a test"), 14, "comment TextureFile t.png\ncomment TextureFile my scan.png");
+  text.replace(text.find("z\n") + 2, 0, "property float s\nproperty float t\n");
+  text.replace(text.find("0 0 0\n1 0 0\n1 1 0\n0 1 0"), 23, "0 0 0 0 0\n1 0 0 1 0\n1 1 0 1 1\n0 1 0 0 1");
+  MemoryResolver resolver = with_texture();
+  const Model m = import(bytes_of(text), resolver);
+  EXPECT_EQ(count_notes(m, "odd-texture-number"), 1);
+  ASSERT_EQ(m.images.size(), 1u);
+  EXPECT_EQ(m.images[0].name, "t.png");
+}
+
+TEST(ImportPly, RowsBehindTheDeclaredOnesAreTold) {
+  EXPECT_EQ(count_notes(import(kSquare + "\n \n"), "trailing-bytes"), 0);
+  EXPECT_EQ(count_notes(import(kSquare + "3 0 1 3\n"), "trailing-bytes"), 1);
+  MemoryResolver resolver = with_texture();
+  for (const bool big : {false, true}) {
+    Bytes rich = rich_ply(big);
+    EXPECT_EQ(count_notes(import(rich, resolver), "trailing-bytes"), 0);
+    rich.push_back(7);
+    EXPECT_EQ(count_notes(import(rich, resolver), "trailing-bytes"), 1);
+  }
+}
+
 TEST(ImportPly, TextureNumbersBeyondTheLastAreTold) {
   const auto textured = [](const std::string& first, const std::string& second, const std::string& more) {
     MemoryResolver resolver = with_texture();
