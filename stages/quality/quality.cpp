@@ -108,8 +108,8 @@ class SwitchSizes {
   std::vector<float> display_px_;
 };
 
-ViewPart views_at(double displayed_px, bool few, const QualityOptions& options) {
-  return is_small(displayed_px, options) && !few ? ViewPart::kAll : ViewPart::kLarge;
+ViewPart views_at(double displayed_px, const QualityOptions& options) {
+  return is_small(displayed_px, options) ? ViewPart::kAll : ViewPart::kLarge;
 }
 
 /// The views in which scales are rendered: those that still pass, and what the table needs of a size beside.
@@ -120,7 +120,7 @@ std::vector<std::optional<ViewPart>> rendered_scales(const std::vector<std::uint
   const std::size_t n = alive.size();
   std::vector<std::optional<ViewPart>> out(n);
   for (std::size_t k = 1; k < n; ++k) {
-    if (alive[k]) out[k] = views_at(height.displayed_px, few, options);
+    if (alive[k]) out[k] = views_at(height.displayed_px, options);
     if (alive[k] || !height.rank) continue;
     if (*height.rank == 0) out[k] = few ? ViewPart::kLarge : ViewPart::kAll;
     if (*height.rank == 1 && (n - 1 - k) % 2 == 0) out[k] = few ? ViewPart::kLargest : ViewPart::kLarge;
@@ -139,7 +139,7 @@ void judge_size(const SizeCells& cells, const Height& height, const TextureSampl
   SizeTask task{
       std::vector<std::optional<ViewPart>>(failed.size()), limits_at(height.between_px, options), {}};
   for (std::size_t k = 0; k < failed.size(); ++k)
-    if (failed[k]) task.scales[k] = views_at(height.between_px, studio.few, options);
+    if (failed[k]) task.scales[k] = views_at(height.between_px, options);
   SizeCells between{height.between_px, {}, {}, {}};
   render_size(sampler, task, studio, between, context);
   sizes.judge_between(between.geometry, failed, height.between_px);
