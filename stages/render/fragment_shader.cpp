@@ -341,29 +341,29 @@ Vec3<Lanes> mapped_normal(const auto& at, const Vec4<Lanes>& texel) {
 
 }  // namespace
 
-/// Each variant takes over what the first one has found of the same texels.
+/// Each variant takes over what the first one that is lit has found of the same texels.
 void FragmentShader::light(std::size_t lanes, Scratch& scratch, std::span<FragmentColour> out) const {
   const std::size_t variants = scratch.variants.size();
-  VariantLanes& first = scratch.variants[0];
+  const VariantLanes* first = nullptr;
   LightingOf<Lanes> first_lighting;
   Vec3<Lanes> first_linear;
   for (std::size_t v = 0; v < variants; ++v) {
     VariantLanes& here = scratch.variants[v];
     if (!any(here.is_lit != 0)) continue;
-    const bool is_first = v == 0, same_normal = !is_first && same(here.normal_texel, first.normal_texel);
+    const bool same_normal = first && same(here.normal_texel, first->normal_texel);
     here.surface.normal =
-        same_normal ? first.surface.normal : mapped_normal(scratch.lanes, here.normal_texel);
+        same_normal ? first->surface.normal : mapped_normal(scratch.lanes, here.normal_texel);
     Vec3<Lanes> linear;
-    if (!is_first && same(here.surface, first.surface)) {
+    if (first && same(here.surface, first->surface)) {
       linear = first_linear;
     } else {
-      const bool same_lighting = same_normal && same(here.surface.roughness, first.surface.roughness);
+      const bool same_lighting = same_normal && same(here.surface.roughness, first->surface.roughness);
       const LightingOf<Lanes> lighting =
           same_lighting ? first_lighting
                         : lighting_of(here.surface, scratch.lanes.to_viewer, environment_,
                                       same_normal ? &first_lighting : nullptr);
       linear = tone_mapped_of(radiance_of(here.surface, lighting, environment_));
-      if (is_first) first_lighting = lighting, first_linear = linear;
+      if (!first) first = &here, first_lighting = lighting, first_linear = linear;
     }
     for (std::size_t i = 0; i < lanes; ++i)
       if (here.is_lit[i]) out[i * variants + v].linear = {linear.x[i], linear.y[i], linear.z[i]};

@@ -112,6 +112,16 @@ TEST(ShadeVariants, AlphaMayHideAFragmentInOneOfThem) {
   }
 }
 
+TEST(ShadeVariants, TheFirstOneMayShowNothingInPartsOfThePicture) {
+  SmallScene scene = textured_scene();
+  scene.materials[0].alpha_mode = AlphaMode::kMask;
+  scene.materials[0].slot(TextureUse::kNormal).texture = -1;
+  scene.textures[0] = texture_of(16, 16, 4, true, [](auto x, auto, auto c) {
+    return std::uint8_t(c < 3 ? 130 : x < 8 ? 0 : 255);
+  });
+  expect_as_alone(scene, {scene.materials, variants_of(scene)[1]}, {});
+}
+
 TEST(ShadeVariants, OtherLengthsAreRefused) {
   const SmallScene scene{square(), {plain({1, 1, 1, 1})}, {}};
   const RenderScene shown = render_scene(scene.mesh, scene.materials, 0);
