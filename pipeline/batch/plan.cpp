@@ -17,6 +17,7 @@
 #include "pipeline/import/archive/archive_files.h"
 #include "pipeline/io/file_resolver.h"
 #include "pipeline/io/names/closest_word.h"
+#include "pipeline/io/new_folder.h"
 #include "pipeline/io/uri.h"
 
 namespace texmesh {
@@ -72,7 +73,7 @@ std::vector<std::string> model_paths(const std::string& folder, Notes* notes) {
   std::vector<std::string> models, others;
   while (it != end) {
     std::string path = it->path().string();
-    if (it->path().filename().string().front() == '.')
+    if (it->path().filename().string().front() == '.' || (it->is_directory(ec) && is_made_folder(it->path())))
       it.disable_recursion_pending();
     else if (it->is_regular_file(ec) && may_be_model(path))
       models.push_back(path);

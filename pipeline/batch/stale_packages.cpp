@@ -6,6 +6,7 @@
 
 #include "format/base/text_bytes.h"
 #include "pipeline/io/atomic_file.h"
+#include "pipeline/io/new_folder.h"
 #include "pipeline/io/resolver.h"
 
 namespace texmesh {
@@ -23,7 +24,7 @@ std::vector<std::string> stale_packages(const BatchPlan& plan) {
   const std::size_t prefix = (fs::path(plan.outputs) / "").native().size();
   for (; !ec && it != end; it.increment(ec)) {
     const std::string& path = it->path().native();
-    if (path[path.rfind('/') + 1] == '.')
+    if (path[path.rfind('/') + 1] == '.' || (it->is_directory(ec) && is_made_folder(it->path())))
       it.disable_recursion_pending();
     else if (path.ends_with(".texmesh") && it->is_regular_file(ec) && !it->is_symlink(ec)) {
       const auto maker = makers.find(std::string_view(path).substr(prefix));

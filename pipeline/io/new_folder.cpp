@@ -5,6 +5,7 @@
 #include <cstdio>
 #include <fstream>
 
+#include "format/base/text_bytes.h"
 #include "pipeline/io/file_stamp.h"
 
 namespace texmesh {
@@ -25,7 +26,32 @@ void write_new_file(const fs::path& path, ByteSpan bytes) {
   if (!write_all(d.get(), bytes) || ::fdatasync(d.get()) != 0) fail_output(path, "written");
 }
 
+std::set<std::string> made_files(const fs::path& folder) {
+  std::ifstream in(folder / kMadeFiles);
+  std::set<std::string> out{kMadeFiles};
+  for (std::string line; std::getline(in, line);) out.insert(line);
+  return out;
+}
+
+/// Nobody's bytes are copied where the file can have a second name.
+void keep_file(const fs::path& from, const fs::path& to) {
+  std::error_code ec;
+  fs::create_directories(to.parent_path(), ec);
+  if (fs::is_symlink(from))
+    fs::copy_symlink(from, to, ec);
+  else if (fs::create_hard_link(from, to, ec); ec)
+    fs::copy_file(from, to, ec);
+  if (ec)
+    throw InputError(from.string(), "", "a name that no new file has, since texmesh has not made this one",
+                     "it cannot stay: " + ec.message() + " (move it elsewhere)");
+}
+
 }  // namespace
+
+bool is_made_folder(const fs::path& folder) {
+  std::error_code ec;
+  return fs::exists(folder / kMadeFiles, ec);
+}
 
 FolderRule marked_folder_rule(const std::string& name, std::string_view begin, std::string replaceable) {
   const auto known = [name, text = std::string(begin)](const fs::path& folder) {
@@ -34,7 +60,7 @@ FolderRule marked_folder_rule(const std::string& name, std::string_view begin, s
     file.read(head.data(), static_cast<std::streamsize>(head.size()));
     return file && head == text;
   };
-  return {true, known, "", std::move(replaceable)};
+  return {true, known, "", std::move(replaceable), true};
 }
 
 NewFolder::NewFolder(const std::string& folder, FolderRule rule) : rule_(std::move(rule)) {
@@ -96,7 +122,25 @@ bool NewFolder::replace_without_exchange() {
   return true;
 }
 
+void NewFolder::list_files() {
+  std::string text;
+  for (const auto& e : fs::recursive_directory_iterator(tree_))
+    if (!e.is_directory()) text += e.path().lexically_relative(tree_).string() + "\n";
+  add(kMadeFiles, text_bytes(text));
+}
+
+void NewFolder::keep_others() {
+  if (!fs::exists(target_)) return;
+  const std::set<std::string> made = made_files(target_);
+  for (const auto& e : fs::recursive_directory_iterator(target_)) {
+    const fs::path path = e.path().lexically_relative(target_);
+    const bool is_folder = e.is_directory() && !e.is_symlink();
+    if (!is_folder && !made.contains(path.string())) keep_file(e.path(), tree_ / path);
+  }
+}
+
 void NewFolder::publish() {
+  if (rule_.keeps_others) list_files(), keep_others();
   for (const auto& e : fs::recursive_directory_iterator(tree_))
     if (e.is_directory()) sync_new_folder(e.path());
   if (::chmod(tree_.c_str(), 0755) != 0) fail_output(tree_, "a folder of one's own");
@@ -123,6 +167,9 @@ void NewFolder::check_target() const {
   if (!rule_.replace) throw InputError(target_.string(), "", rule_.instead, "a folder with files");
   if (!rule_.known(target_))
     throw InputError(target_.string(), "", rule_.replaceable, "a folder with other files");
+  if (rule_.keeps_others && !is_made_folder(target_))
+    throw InputError((target_ / kMadeFiles).string(), "", "the names of the files that texmesh has made",
+                     "none, so nobody knows which ones are somebody else's: remove the folder");
 }
 
 ScratchFolder::ScratchFolder(const std::string& name) {

@@ -7,17 +7,23 @@
 
 namespace texmesh {
 
+/// Names the files of a folder that texmesh has made, a line each. What else is in the folder is somebody's:
+/// it stays when the folder is made anew, and no search for models or packages looks into such a folder.
+inline constexpr const char* kMadeFiles = ".texmesh-files";
+bool is_made_folder(const std::filesystem::path& folder);
+
 /// What may become of a folder that is there already and holds files.
 struct FolderRule {
   bool replace = false;  // where `known` says yes
   std::function<bool(const std::filesystem::path& folder)>
       known;            // whether the folder is of the kind written
   std::string instead;  // for the error without `replace`: what is expected in place of a folder with files
-  std::string replaceable;  // for the error with `replace`: the only kind of folder that is replaced
+  std::string replaceable;    // for the error with `replace`: the only kind of folder that is replaced
+  bool keeps_others = false;  // kMadeFiles is written, and files that an earlier one does not name stay
 };
 
-/// A folder is new or empty, or its file `name` begins with `begin` and it is replaced. `replaceable` as
-/// above.
+/// A folder is new or empty, or its file `name` begins with `begin` and it is replaced, but for the files
+/// that somebody else has put there. `replaceable` as above.
 FolderRule marked_folder_rule(const std::string& name, std::string_view begin, std::string replaceable);
 
 /// A folder under a temporary name beside its own, which takes its own name in publish(), or disappears with
@@ -37,11 +43,13 @@ class NewFolder {
   void copy(const std::string& path, const std::filesystem::path& source);
   /// Files and folders are on the disk before the name is taken. What is replaced goes away in one step, but
   /// on file systems that cannot exchange two folders (NFS, FUSE, overlayfs), where there is none for a
-  /// moment.
+  /// moment. InputError where a file that stays has the name of a new one.
   void publish();
 
  private:
   void check_target() const;
+  void list_files();
+  void keep_others();
   bool replace_without_exchange();
   void copy_file(const std::filesystem::path& file, const std::filesystem::path& source);
 

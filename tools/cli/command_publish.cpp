@@ -205,8 +205,11 @@ void add_target_options(Command& c, ExportArguments& args) {
        "other pages and the oEmbed answer that tells of it",
        "TARGET")
       .required();
-  c.option("-o,--output", args.folder,
-           "The folder to make. An earlier export is replaced; any other folder with files is refused", "DIR")
+  c.option(
+       "-o,--output", args.folder,
+       "The folder to make. An earlier export is replaced, and files of yours in it stay; any other folder with "
+       "files is refused",
+       "DIR")
       .required();
   c.option("--display", args.options.display_px,
            "Nothing finer than what this displayed height of the object needs, device px; default: "
@@ -475,10 +478,11 @@ void add_view_command(Command& app) {
 void add_report_command(Command& app) {
   auto [c, args] = app.add("report", "Write a page that shows what viewers of a package see", run_report);
   add_package_argument(c, args.package, true).required();
-  c.option("-o,--output", args.folder,
-           "The folder to make, with index.html in it. An earlier report is replaced; any other folder with "
-           "files is refused",
-           "DIR")
+  c.option(
+       "-o,--output", args.folder,
+       "The folder to make, with index.html in it. An earlier report is replaced, and files of yours in it stay; "
+       "any other folder with files is refused",
+       "DIR")
       .required();
   c.option("--against", args.options.against,
            "The model file behind the package: S_0 at the highest rung is rendered beside it", "SOURCE");
@@ -540,10 +544,11 @@ void add_site_command(Command& app) {
       app.add("site", "Write a static site of a collection: posters, search, licences, a viewer", run_site);
   c.option("PACKAGES", args.packages, "A folder of packages, whose folders are looked into; or one package")
       .required();
-  c.option("-o,--output", args.folder,
-           "The folder to make, with index.html in it. An earlier site is replaced; any other folder with "
-           "files is refused",
-           "DIR")
+  c.option(
+       "-o,--output", args.folder,
+       "The folder to make, with index.html in it. An earlier site is replaced, and files of yours in it stay; "
+       "any other folder with files is refused",
+       "DIR")
       .required();
   c.option("--title", args.options.title, "Title of the collection", "TEXT").shows_default();
   c.option("--packages-url", args.options.packages_url,

@@ -38,6 +38,15 @@ TEST(FindModels, WaitsForNoPipeAndEntersNoHiddenFolder) {
   EXPECT_FALSE(holds_model(folder / "x.json"));
 }
 
+TEST(FindModels, WhatTexmeshHasMadeIsNoScan) {
+  const TemporaryFolder folder;
+  fs::create_directories(folder / "site/downloads");
+  write_text(folder / "site/.texmesh-files", "downloads/a.glb\n");
+  write_text(folder / "site/downloads/a.glb", "x");
+  write_text(folder / "a.glb", "x");
+  EXPECT_EQ(list_models(folder.path().string()), std::vector<std::string>{"a.glb"});
+}
+
 TEST(FindModels, AFolderThatCannotBeListedIsAnError) {
   if (::geteuid() == 0) GTEST_SKIP() << "root lists everything";
   const TemporaryFolder folder;

@@ -7,6 +7,7 @@
 
 #include <csignal>
 
+#include "format/base/text_bytes.h"
 #include "tests/support/command.h"
 
 namespace texmesh::testing::new_folder_test {
@@ -31,6 +32,44 @@ TEST(NewFolder, CopiesFilesForEverybodyToRead) {
   EXPECT_EQ(error_of_copy(folder, "source"), "");
   EXPECT_TRUE(read_text(folder / "made/copy/file") == text);
   EXPECT_EQ(fs::status(folder / "made/copy/file").permissions(), fs::perms{0644});
+}
+
+void make_site(const std::string& path, const std::string& page) {
+  NewFolder made(path, marked_folder_rule("index.html", "<!-- a site", "an earlier site"));
+  made.add("index.html", text_bytes("<!-- a site" + page));
+  made.add("pages/" + page, text_bytes(page));
+  made.publish();
+}
+
+TEST(NewFolder, KeepsWhatSomebodyElseHasPutThere) {
+  TemporaryFolder folder;
+  const std::string site = folder / "site";
+  make_site(site, "old");
+  fs::create_directories(site + "/mine/scans");
+  for (const char* name : {"imprint.html", ".htaccess", "mine/scans/bust.texmesh", "pages/mine"})
+    write_text(site + "/" + name, name);
+  fs::create_symlink("imprint.html", site + "/link");
+  for (int again = 0; again < 2; ++again) {
+    make_site(site, "new");
+    EXPECT_EQ(read_text(site + "/index.html"), "<!-- a sitenew");
+    EXPECT_FALSE(fs::exists(site + "/pages/old"));
+    for (const char* name : {"imprint.html", ".htaccess", "mine/scans/bust.texmesh", "pages/mine"})
+      EXPECT_EQ(read_text(site + "/" + name), name);
+    EXPECT_EQ(fs::read_symlink(site + "/link"), "imprint.html");
+  }
+}
+
+TEST(NewFolder, ReplacesNobodysFile) {
+  TemporaryFolder folder;
+  const std::string site = folder / "site";
+  make_site(site, "old");
+  write_text(site + "/pages/new", "mine");
+  EXPECT_THROW(make_site(site, "new"), InputError);
+  EXPECT_EQ(read_text(site + "/pages/new"), "mine");
+  EXPECT_EQ(read_text(site + "/pages/old"), "old");
+  fs::remove(site + "/" + kMadeFiles);
+  EXPECT_THROW(make_site(site, "other"), InputError) << "nobody knows what is whose";
+  EXPECT_EQ(std::distance(fs::directory_iterator(folder.path()), {}), 1) << "nothing is left beside it";
 }
 
 TEST(NewFolder, RefusesWhatIsNoFile) {

@@ -106,7 +106,11 @@ TEST_F(Collection, APackageWithoutItsModelIsToldUntilItIsRemoved) {
                                  "--cache", folder_ / "cache", "--profile", folder_ / "profile.json"})))
       << "a file's siblings are no business of its run";
   EXPECT_TRUE(fs::exists(folder_ / "out/b.texmesh"));
+  fs::create_directories(folder_ / "out/site/packages");
+  for (const char* file : {"out/site/.texmesh-files", "out/site/packages/x.texmesh"})
+    write_text(folder_ / file, "");
   const CommandResult removed = compile({"--remove-stale"});
+  EXPECT_TRUE(fs::exists(folder_ / "out/site/packages/x.texmesh")) << "a site's packages are its own";
   EXPECT_NE(removed.output.find("b.texmesh: removed"), std::string::npos) << removed.output;
   EXPECT_FALSE(fs::exists(folder_ / "out/b.texmesh"));
   EXPECT_TRUE(fs::exists(folder_ / "out/a.texmesh"));

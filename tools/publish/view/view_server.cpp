@@ -13,6 +13,7 @@
 #include "delivery/cpp/package/package_reader.h"
 #include "format/base/text_bytes.h"
 #include "format/container/layout.h"
+#include "pipeline/io/new_folder.h"
 #include "pipeline/io/uri.h"
 
 namespace texmesh {
@@ -242,7 +243,7 @@ void list_packages(const fs::path& folder, const std::string& prefix, int depth,
     if (!fs::is_directory(status)) continue;
     if (fs::is_regular_file(fs::symlink_status(e.path() / kManifestPath, error)))
       found.push_back(prefix + name + "/");
-    else if (depth < kMaxDepth)
+    else if (depth < kMaxDepth && !is_made_folder(e.path()))
       list_packages(e.path(), prefix + name + "/", depth + 1, out);
   }
 }

@@ -115,6 +115,16 @@ TEST(Site, LeavesOutWhatNoModelMakesAndNamesThatMeet) {
   EXPECT_EQ(site.stale, std::vector<std::string>{"b.texmesh"});
 }
 
+TEST(Site, OneBeneathThePackagesAddsNoneToAnother) {
+  TemporaryFolder folder;
+  add_package(folder, "a.texmesh", "");
+  std::filesystem::create_directories(folder / "site/packages");
+  std::filesystem::copy_file(folder / "a.texmesh", folder / "site/packages/a.texmesh");
+  EXPECT_EQ(read_site(folder.path().string(), {}).objects.size(), 2u);
+  testing::write_text(folder / "site/.texmesh-files", "packages/a.texmesh\n");
+  EXPECT_EQ(read_site(folder.path().string(), {}).objects.size(), 1u);
+}
+
 TEST(Site, HasFiguresOfEveryPackageByTitle) {
   TemporaryFolder folder;
   add_package(folder, "1.texmesh", "zebra");
