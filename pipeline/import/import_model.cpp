@@ -79,17 +79,22 @@ void add_to_source(About& about, const char* key, nlohmann::ordered_json value) 
   if (with_value.size() <= kMaxAboutSourceBytes) about.source = std::move(with_value);
 }
 
-/// Where the user has not said which axis is up: the source's word, else a guess. glTF says that y is.
+/// Where the user has not said which axis is up: the source's word, else a guess. glTF says that y is, and
+/// eastings and northings leave z for heights.
 void turn_by_source(ImportedModel& m) {
   const bool said = !m.about.up_axis.empty();
   const bool may_guess = m.format == "obj" || m.format == "ply" || m.format == "stl";
-  const char up = said ? m.about.up_axis[0] : may_guess ? guessed_up(m.model.mesh) : '\0';
+  char up = said ? m.about.up_axis[0] : may_guess ? guessed_up(m.model.mesh) : '\0';
+  const bool by_crs = up == '\0' && may_guess && (!m.about.crs.empty() || m.about.epsg != 0);
+  if (by_crs) up = 'z';
   if (up != 'x' && up != 'z') return;
   turn_up(m.model.mesh, up);
   m.about.up_axis = "y";
   add_info(m.model.notes, kTurnedNote, "",
-           std::string(said ? "the source says that " : "by its flat bottom ") + up +
-               " is up; turned so that y is (--up keep leaves it as it is)");
+           std::string(said     ? "the source says that "
+                       : by_crs ? "as in its coordinate reference "
+                                : "by its flat bottom ") +
+               up + " is up; turned so that y is (--up keep leaves it as it is)");
   add_to_source(m.about, kTurnedMember,
                 {{"up", std::string(1, up)}, {"by", said ? "the source's word" : "a guess"}});
 }

@@ -61,11 +61,15 @@ TEST(ImportModel, WhatTheSourceSaysOfItself) {
   EXPECT_EQ(silent.source, R"({"format":"obj"})");
   EXPECT_EQ(silent.metres_per_unit, 0) << "nobody has said";
   EXPECT_EQ(silent.up_axis, "");
-  const ImportedModel ply = imported(
-      "a.ply",
+  const std::string terrain =
       "ply\nformat ascii 1.0\ncomment licence: CC-BY-4.0\nobj_info crs: EPSG:25832\ncomment unit: cubit\n"
       "element vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
-      "element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n");
+      "element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n";
+  const ImportedModel ply = imported("a.ply", terrain);
+  const ImportedModel upright = imported("a.ply", terrain, UpAxis::kAuto);
+  EXPECT_EQ(upright.model.mesh.positions, imported("a.ply", terrain, UpAxis::kZ).model.mesh.positions)
+      << "eastings and northings leave z for heights";
+  EXPECT_EQ(count_notes(upright.model, kTurnedNote), 1);
   EXPECT_EQ(ply.about.licence, "CC-BY-4.0");
   EXPECT_EQ(ply.about.epsg, 25832u);
   EXPECT_EQ(count_notes(ply.model, "about-value"), 1);
