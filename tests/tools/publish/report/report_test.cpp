@@ -166,10 +166,10 @@ TEST(Report, TheFolderAppearsWholeAndReplacesReportsOnly) {
   const TemporaryFolder folder;
   const Report report = report_of(sample());
   write_report(report, folder / "r");
-  EXPECT_EQ(files_beneath(folder / "r").size(), report.files.size());
-  write_text(folder / "r/stale.txt", "x");
+  EXPECT_EQ(files_beneath(folder / "r").size(), report.files.size() + 1) << "and the list of them";
+  write_text(folder / "r/mine.txt", "x");
   write_report(report, folder / "r");
-  EXPECT_EQ(files_beneath(folder / "r").size(), report.files.size());
+  EXPECT_EQ(files_beneath(folder / "r").size(), report.files.size() + 2);
   EXPECT_EQ(read_text(folder / "r/index.html"), page_of(report));
 
   std::filesystem::create_directories(folder / "other");
