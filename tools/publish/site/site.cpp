@@ -38,6 +38,7 @@ std::string without_ending(std::string path) {
 
 void read_object(SiteObject& object) {
   PackageReader package(open_store(object.source));
+  check_completeness(package);
   const Manifest& m = package.manifest();
   object.digest = to_hex(package.id()).substr(0, 16);
   object.about = package.about();

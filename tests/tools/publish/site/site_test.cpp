@@ -131,6 +131,23 @@ TEST(Site, HasFiguresOfEveryPackageByTitle) {
   EXPECT_EQ(site.objects[1].address, "packages/2." + site.objects[1].digest + ".texmesh");
 }
 
+TEST(Site, APackageThatACopyCutOffIsAFault) {
+  TemporaryFolder folder;
+  const std::size_t bytes = add_package(folder, "cut.texmesh", "");
+  add_package(folder, "whole.texmesh", "");
+  std::filesystem::resize_file(folder / "cut.texmesh", bytes - 1);
+  const std::string tree = std::string(TEXMESH_SOURCE_DIR) + "/tests/golden/v2.0-tree";
+  for (const char* name : {"tree", "torn", "short"})
+    std::filesystem::copy(tree, folder / name, std::filesystem::copy_options::recursive);
+  std::filesystem::remove(folder / "torn/mesh/s00.glb");
+  std::filesystem::resize_file(folder / "short/mesh/s00.glb", 100);
+  const Site site = read_site(folder.path().string(), {});
+  std::set<std::string> faults;
+  for (const SiteFault& f : site.faults) faults.insert(f.path);
+  EXPECT_EQ(faults, (std::set<std::string>{"cut.texmesh", "short/", "torn/"}));
+  EXPECT_EQ(site.objects.size(), 2u);
+}
+
 TEST(Site, AFolderWithoutPackagesIsRefused) {
   TemporaryFolder folder;
   EXPECT_THROW(read_site(folder.path().string(), {}), InputError);
