@@ -185,7 +185,7 @@ std::string page_address(const SiteObject& object, const SiteOptions& options) {
 
 std::string viewer_address(const SiteObject& o, const SiteOptions& options) {
   const std::string package = is_web_url(o.address) ? o.address : "../" + o.address;
-  return options.url + "viewer/index.html?panel=0&pkg=" + percent_encoded(package);
+  return options.url + "viewer/index.html?panel=none&pkg=" + percent_encoded(package);
 }
 
 std::string meta_html(const char* kind, const char* name, const std::string& content) {

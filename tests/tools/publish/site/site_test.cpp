@@ -148,6 +148,27 @@ TEST(Site, APackageThatACopyCutOffIsAFault) {
   EXPECT_EQ(site.objects.size(), 2u);
 }
 
+/// The page of the one object of a site whose package says this of itself.
+std::string page_of(const About& about, SiteOptions options = {}) {
+  TemporaryFolder folder;
+  testing::PackageParts parts = testing::make_package_parts();
+  parts.about = about;
+  const Bytes bytes = parts.build();
+  for (const char* name : {"in", "viewer"}) std::filesystem::create_directory(folder / name);
+  testing::write_text(folder / "in/a.texmesh", std::string(bytes.begin(), bytes.end()));
+  options.viewer = folder / "viewer";
+  write_site(read_site(folder / "in", options), folder / "www");
+  return testing::read_text(folder / "www/objects/a.html");
+}
+
+TEST(Site, AFrameOnPagesOfOthersHasNoDevelopersPanel) {
+  SiteOptions options;
+  options.url = "https://museum.example/";
+  const std::string page = page_of({}, options);
+  EXPECT_NE(page.find("viewer/index.html?panel=none&amp;amp;pkg="), page.npos);
+  EXPECT_EQ(page.find("panel=0"), page.npos);
+}
+
 TEST(Site, AFolderWithoutPackagesIsRefused) {
   TemporaryFolder folder;
   EXPECT_THROW(read_site(folder.path().string(), {}), InputError);
