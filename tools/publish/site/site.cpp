@@ -143,12 +143,34 @@ std::string json_text(const OrderedJson& json, int indent) {
   return json.dump(indent, ' ', false, OrderedJson::error_handler_t::replace);
 }
 
-/// Of the first date that begins with one; "" without.
-std::string year_of(const About& about) {
-  for (const NamedText& date : about.dates)
-    if (date.text.size() >= 4 && date.text.find_first_not_of("0123456789") >= 4)
-      return date.text.substr(0, 4);
+/// The first four digits that stand alone, or begin a date in eight; "" without.
+std::string year_in(const std::string& text) {
+  constexpr const char* kDigits = "0123456789";
+  for (std::size_t at = 0; (at = text.find_first_of(kDigits, at)) != text.npos;) {
+    const std::size_t end = std::min(text.find_first_not_of(kDigits, at), text.size());
+    if (end - at == 4 || end - at == 8) return text.substr(at, 4);
+    at = end;
+  }
   return "";
+}
+
+/// When the model was made, which is not when the object was: that one was found or carved long before. Dates
+/// that say neither count where no other says more.
+std::string year_of(const About& about) {
+  static const std::set<std::string> of_models{"scanned",      "captured",  "digitised", "digitized",
+                                               "photographed", "modelled",  "modeled",   "xmp:createdate"},
+      of_either{"created", "date", "dc:date", "published"};
+  for (const auto* events : {&of_models, &of_either})
+    for (const NamedText& date : about.dates)
+      if (events->contains(in_lower_case(date.name)))
+        if (const std::string year = year_in(date.text); !year.empty()) return year;
+  return "";
+}
+
+/// How the object wants to be credited, and its licence.
+std::string citation_note(const About& about) {
+  const std::string licence = about.licence.empty() ? "" : "Licence: " + about.licence;
+  return about.attribution + (about.attribution.empty() || licence.empty() ? "" : "; ") + licence;
 }
 
 std::string in_tex(const std::string& text) {
@@ -240,7 +262,7 @@ std::string bibtex_entry(const SiteObject& o, const SiteOptions& options) {
   add("year", year_of(o.about));
   add("howpublished", "3D model, " + in_tex(options.title));
   if (!options.url.empty()) add("url", page_address(o, options));
-  if (!o.about.licence.empty()) add("note", "Licence: " + in_tex(o.about.licence));
+  add("note", in_tex(citation_note(o.about)));
   return out + "\n}\n";
 }
 
@@ -252,7 +274,7 @@ std::string csl_item(const SiteObject& o, const SiteOptions& options) {
     item["issued"] = {{"date-parts", {{std::stoi(year)}}}};
   item["publisher"] = options.title;
   if (!options.url.empty()) item["URL"] = page_address(o, options);
-  if (!o.about.licence.empty()) item["note"] = "Licence: " + o.about.licence;
+  if (const std::string note = citation_note(o.about); !note.empty()) item["note"] = note;
   return json_text(item, 2) + "\n";
 }
 

@@ -1,5 +1,6 @@
 #include "tools/publish/site/site.h"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <map>
@@ -167,6 +168,28 @@ TEST(Site, AFrameOnPagesOfOthersHasNoDevelopersPanel) {
   const std::string page = page_of({}, options);
   EXPECT_NE(page.find("viewer/index.html?panel=none&amp;amp;pkg="), page.npos);
   EXPECT_EQ(page.find("panel=0"), page.npos);
+}
+
+TEST(Site, ACitationHasTheYearOfTheModelAndItsCredit) {
+  About about;
+  about.attribution = "Museum & Co";
+  about.licence = "CC0-1.0";
+  const std::pair<std::vector<NamedText>, const char*> years[] = {
+      {{{"found", "1897"}, {"scanned", "spring 2021"}}, "2021"},
+      {{{"dc:date", "1897"}, {"xmp:CreateDate", "2020-01-02"}}, "2020"},
+      {{{"created", "20190304"}}, "2019"},
+      {{{"date", "no. 12345, 3.4.2018"}}, "2018"},
+      {{{"found", "1897"}, {"Scanned", "last year"}}, ""}};
+  for (const auto& [dates, year] : years) {
+    about.dates = dates;
+    const std::string page = page_of(about);
+    const std::string expected = *year ? fmt::format("year = {{{}}}", year) : "";
+    EXPECT_NE(page.find(expected), page.npos) << year;
+    EXPECT_EQ(page.find("year = ") != page.npos, *year != 0) << dates[0].text;
+    EXPECT_EQ(page.find("issued") != page.npos, *year != 0) << dates[0].text;
+    EXPECT_NE(page.find("note = {Museum \\&amp; Co; Licence: CC0-1.0}"), page.npos);
+    EXPECT_NE(page.find("&quot;note&quot;: &quot;Museum &amp; Co; Licence: CC0-1.0&quot;"), page.npos);
+  }
 }
 
 TEST(Site, AFolderWithoutPackagesIsRefused) {
