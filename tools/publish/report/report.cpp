@@ -76,8 +76,8 @@ std::string switch_figure(PackagePictures& pictures, const SwitchSize& s, Report
                                  : "");
   const std::uint32_t side_px = pictures.side_for(s.rendered_px);
   for (const auto& [view, file, name] : shown_views(s.views.worst(), report.options.views))
-    out += picture_row({fmt::format("s{:02}-{}", s.scale, file),
-                        fmt::format("S_0, {}", name), fmt::format("S_{}, {}", s.scale, name),
+    out += picture_row({fmt::format("s{:02}-{}", s.scale, file), fmt::format("S_0, {}", name),
+                        fmt::format("S_{}, {}", s.scale, name),
                         fmt::format("S_{} at {:.0f} px, {}", s.scale, s.rendered_px, name)},
                        pictures.picture(0, view, side_px), pictures.picture(s.scale, view, side_px),
                        report.files);
@@ -152,10 +152,9 @@ std::string source_section(PackagePictures& pictures, const RenderedModel& sourc
       markup_escaped(c.file), c.displayed_px, c.views.mean.size(), c.views.worst_mean(), c.views.worst_p95(),
       report.options.views == 1 ? "The front view." : "The worst view, and one of the front.");
   for (const auto& [view, file, name] : shown_views(c.views.worst(), report.options.views))
-    body += picture_row({fmt::format("source-{}", file), "Source", "S_0, best textures",
-                         "S_0 beside the source"},
-                        pictures.picture_of(source, offset, view, side_px),
-                        pictures.picture(0, view, side_px), report.files);
+    body += picture_row(
+        {fmt::format("source-{}", file), "Source", "S_0, best textures", "S_0 beside the source"},
+        pictures.picture_of(source, offset, view, side_px), pictures.picture(0, view, side_px), report.files);
   return html_section("source", "Against the source", body + "</figure>\n");
 }
 

@@ -157,8 +157,8 @@ std::string year_in(const std::string& text) {
 /// When the model was made, which is not when the object was: that one was found or carved long before. Dates
 /// that say neither count where no other says more.
 std::string year_of(const About& about) {
-  static const std::set<std::string> of_models{"scanned",      "captured",  "digitised", "digitized",
-                                               "photographed", "modelled",  "modeled",   "xmp:createdate"},
+  static const std::set<std::string> of_models{"scanned",      "captured", "digitised", "digitized",
+                                               "photographed", "modelled", "modeled",   "xmp:createdate"},
       of_either{"created", "date", "dc:date", "published"};
   for (const auto* events : {&of_models, &of_either})
     for (const NamedText& date : about.dates)
@@ -519,6 +519,17 @@ Site read_site(const std::string& packages, const SiteOptions& options) {
   std::ranges::sort(site.objects, {},
                     [](const SiteObject& o) { return std::tuple(in_lower_case(o.title), o.path); });
   return site;
+}
+
+std::string unknown_units(const Site& site) {
+  const auto unknown = [](const SiteObject& o) { return o.about.metres_per_unit == 0; };
+  const auto first = std::ranges::find_if(site.objects, unknown);
+  if (site.options.downloads_px == 0 || first == site.objects.end()) return "";
+  const auto count = static_cast<std::uint64_t>(std::ranges::count_if(site.objects, unknown));
+  return fmt::format(
+      "the unit of length of {} is not known{}; programs and iPhones take lengths in the downloads for metres "
+      "(texmesh compile --meta tells the unit)",
+      count == 1 ? first->path : counted(count, "package"), count == 1 ? "" : ", as of " + first->path);
 }
 
 FolderRule site_folder_rule() {

@@ -192,6 +192,23 @@ TEST(Site, ACitationHasTheYearOfTheModelAndItsCredit) {
   }
 }
 
+TEST(Site, DownloadsOfUnknownUnitsAreTold) {
+  TemporaryFolder folder;
+  for (const char* name : {"a", "b"}) add_package(folder, std::string(name) + ".texmesh", "");
+  SiteOptions options;
+  EXPECT_EQ(unknown_units(read_site(folder.path().string(), options)), "");
+  options.downloads_px = 64;
+  Site site = read_site(folder.path().string(), options);
+  for (SiteObject& o : site.objects) o.about.metres_per_unit = 0;
+  EXPECT_TRUE(
+      unknown_units(site).starts_with("the unit of length of 2 packages is not known, as of a.texmesh;"))
+      << unknown_units(site);
+  site.objects[0].about.metres_per_unit = 0.001;
+  EXPECT_TRUE(unknown_units(site).starts_with("the unit of length of b.texmesh is not known; "));
+  site.objects[1].about.metres_per_unit = 1;
+  EXPECT_EQ(unknown_units(site), "");
+}
+
 TEST(Site, AFolderWithoutPackagesIsRefused) {
   TemporaryFolder folder;
   EXPECT_THROW(read_site(folder.path().string(), {}), InputError);
