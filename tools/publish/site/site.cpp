@@ -89,7 +89,7 @@ std::string address_of(const SiteObject& object, const SiteOptions& options) {
 }
 
 /// The way from an object's page to the site's files.
-std::string root_of(const SiteObject& o) {
+std::string way_to_root(const SiteObject& o) {
   std::string root = "../";
   for (const char c : o.name)
     if (c == '/') root += "../";
@@ -410,7 +410,7 @@ std::string downloads_html(const SiteObject& o, const std::string& root, const S
 }
 
 std::string object_page(const SiteObject& o, const SiteOptions& options, const SiteWords& words) {
-  const std::string root = root_of(o);
+  const std::string root = way_to_root(o);
   // The package's address is encoded twice: the viewer decodes the query before it takes the value for a URL.
   const std::string viewer =
       root + "viewer/index.html?panel=none&pkg=" + percent_encoded(from_below("../", o.address)) +
