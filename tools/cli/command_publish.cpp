@@ -282,7 +282,8 @@ int run_site(SiteArguments& args) {
   for (const std::string& path : site.stale)
     std::cerr << "note: " << printable(path)
               << " is left out: no model makes this package any more (compile --remove-stale removes it)\n";
-  if (!site.links.empty()) std::cerr << "note: " << printable(site.links) << '\n';
+  for (const std::string& note : {site.links, unknown_units(site)})
+    if (!note.empty()) std::cerr << "note: " << printable(note) << '\n';
   write_site(site, args.folder);
   const std::string page = (std::filesystem::path(args.folder) / "index.html").string();
   if (args.json)

@@ -158,8 +158,10 @@ TEST_F(SiteCommand, WithItsAddressItTellsEnginesNetworksAndCitations) {
   about.dates = {{"created", "1923-05"}};
   add("c.texmesh", "50 % \"bust\"", about);
   ASSERT_EQ(site({"--url", "no"}).exit_code, 2);
-  ASSERT_EQ(
-      site({"--url", "https://museum.example/casts", "--downloads", "64", "--title", "Casts"}).exit_code, 0);
+  const CommandResult made =
+      site({"--url", "https://museum.example/casts", "--downloads", "64", "--title", "Casts"});
+  ASSERT_EQ(made.exit_code, 0) << made.errors;
+  EXPECT_NE(made.errors.find("note: the unit of length of 2 packages"), std::string::npos) << made.errors;
   const std::string html = text("objects/c.html");
   EXPECT_EQ(tag_fault(html), "");
   EXPECT_EQ(html.find("<script>"), std::string::npos);

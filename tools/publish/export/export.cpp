@@ -4,6 +4,7 @@
 
 #include "delivery/cpp/decide/texture_loss.h"
 #include "format/base/text_bytes.h"
+#include "format/container/layout.h"
 #include "format/rules/viewing.h"
 #include "pipeline/io/markup.h"
 #include "pipeline/io/table.h"
@@ -301,6 +302,7 @@ void export_oembed(PackageReader& package, const std::string& path, const Export
   object.about.title = package_title(package);
   std::string from_viewer = path;  // as the viewer's page names the package
   if (!is_web_url(path)) {
+    check_completeness(package);
     const bool tree = package.store().is_folder();
     made.copies.push_back({tree ? "object" : "object.texmesh", path});
     from_viewer = tree ? "../object/" : "../object.texmesh";
@@ -326,6 +328,15 @@ void export_oembed(PackageReader& package, const std::string& path, const Export
 }
 
 }  // namespace
+
+void check_completeness(PackageReader& package) {
+  PackageStore& store = package.store();
+  if (!store.is_folder()) store.list();
+  for (const EntryRef& e : package.entries()) {
+    const bool may_be_files = store.is_folder() && parse_entry_path(e.path).kind == EntryKind::kRung;
+    if (!may_be_files || fs::exists(fs::path(store.name()) / e.path)) store.read(e, 0, 0);
+  }
+}
 
 std::vector<TileLevel> tile_levels(const Manifest& manifest, double display_px,
                                    const PlanesOfHeight& planes) {

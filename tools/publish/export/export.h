@@ -78,6 +78,10 @@ struct Export {
 Export make_export(PackageReader& package, const std::string& path, const ExportOptions& options,
                    const RunContext& context);
 
+/// Before a package on this machine is copied: FormatError where its file has no end, or a file of its tree
+/// is missing or has another size. Fragments that stand in a tree as single files are not counted.
+void check_completeness(PackageReader& package);
+
 /// export.json of the folder, which names its files (schemas/export.v1.schema.json).
 std::string export_list(const Export& made);
 

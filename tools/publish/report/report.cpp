@@ -54,6 +54,18 @@ std::string switch_table(const Report& report) {
   return table.html();
 }
 
+/// A view that stands on the page, what its files are called, and its name for people.
+struct ShownView {
+  ViewNumber view;
+  const char *file, *name;
+};
+/// The worst of `views` and the front one, which of a single view are the same.
+std::vector<ShownView> shown_views(std::size_t worst, int views) {
+  const ShownView front{{0, 1}, "front", "front view"};
+  if (views == 1) return {front};
+  return {{{static_cast<int>(worst), views}, "worst", "worst view"}, front};
+}
+
 std::string switch_figure(PackagePictures& pictures, const SwitchSize& s, Report& report) {
   std::string out = fmt::format(
       "<figure>\n<figcaption><h3>S_{}, shown up to {} px</h3>{} triangles. In the worst of {} views, "
@@ -63,14 +75,9 @@ std::string switch_figure(PackagePictures& pictures, const SwitchSize& s, Report
       s.rendered_px < s.up_to_px ? fmt::format(" Rendered at {:.0f} px, the largest there is.", s.rendered_px)
                                  : "");
   const std::uint32_t side_px = pictures.side_for(s.rendered_px);
-  const auto worst = static_cast<int>(s.views.worst());
-  const struct {
-    ViewNumber view;
-    const char* name;
-  } views[] = {{{worst, report.options.views}, "worst view"}, {{0, 1}, "front view"}};
-  for (const auto& [view, name] : views)
-    out += picture_row({fmt::format("s{:02}-{}", s.scale, view.count == 1 ? "front" : "worst"),
-                        fmt::format("S_0, {}", name), fmt::format("S_{}, {}", s.scale, name),
+  for (const auto& [view, file, name] : shown_views(s.views.worst(), report.options.views))
+    out += picture_row({fmt::format("s{:02}-{}", s.scale, file), fmt::format("S_0, {}", name),
+                        fmt::format("S_{}, {}", s.scale, name),
                         fmt::format("S_{} at {:.0f} px, {}", s.scale, s.rendered_px, name)},
                        pictures.picture(0, view, side_px), pictures.picture(s.scale, view, side_px),
                        report.files);
@@ -141,14 +148,13 @@ std::string source_section(PackagePictures& pictures, const RenderedModel& sourc
       "<p>The model file <strong>{}</strong> beside S_0 with its best textures, {:.0f} px high. In the worst of {} "
       "views, all pixels differ by {:.3f} in the mean, 95 % of them by at most {:.3f}. That is what the package's "
       "compression changes.</p>\n"
-      "<figure>\n<figcaption class=\"quiet\">The worst view, and one of the front.</figcaption>\n",
-      markup_escaped(c.file), c.displayed_px, c.views.mean.size(), c.views.worst_mean(), c.views.worst_p95());
-  for (const ViewNumber view :
-       {ViewNumber{static_cast<int>(c.views.worst()), report.options.views}, ViewNumber{0, 1}})
-    body += picture_row({view.count == 1 ? "source-front" : "source-worst", "Source", "S_0, best textures",
-                         "S_0 beside the source"},
-                        pictures.picture_of(source, offset, view, side_px),
-                        pictures.picture(0, view, side_px), report.files);
+      "<figure>\n<figcaption class=\"quiet\">{}</figcaption>\n",
+      markup_escaped(c.file), c.displayed_px, c.views.mean.size(), c.views.worst_mean(), c.views.worst_p95(),
+      report.options.views == 1 ? "The front view." : "The worst view, and one of the front.");
+  for (const auto& [view, file, name] : shown_views(c.views.worst(), report.options.views))
+    body += picture_row(
+        {fmt::format("source-{}", file), "Source", "S_0, best textures", "S_0 beside the source"},
+        pictures.picture_of(source, offset, view, side_px), pictures.picture(0, view, side_px), report.files);
   return html_section("source", "Against the source", body + "</figure>\n");
 }
 

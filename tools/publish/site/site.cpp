@@ -38,6 +38,7 @@ std::string without_ending(std::string path) {
 
 void read_object(SiteObject& object) {
   PackageReader package(open_store(object.source));
+  check_completeness(package);
   const Manifest& m = package.manifest();
   object.digest = to_hex(package.id()).substr(0, 16);
   object.about = package.about();
@@ -88,7 +89,7 @@ std::string address_of(const SiteObject& object, const SiteOptions& options) {
 }
 
 /// The way from an object's page to the site's files.
-std::string root_of(const SiteObject& o) {
+std::string way_to_root(const SiteObject& o) {
   std::string root = "../";
   for (const char c : o.name)
     if (c == '/') root += "../";
@@ -142,12 +143,34 @@ std::string json_text(const OrderedJson& json, int indent) {
   return json.dump(indent, ' ', false, OrderedJson::error_handler_t::replace);
 }
 
-/// Of the first date that begins with one; "" without.
-std::string year_of(const About& about) {
-  for (const NamedText& date : about.dates)
-    if (date.text.size() >= 4 && date.text.find_first_not_of("0123456789") >= 4)
-      return date.text.substr(0, 4);
+/// The first four digits that stand alone, or begin a date in eight; "" without.
+std::string year_in(const std::string& text) {
+  constexpr const char* kDigits = "0123456789";
+  for (std::size_t at = 0; (at = text.find_first_of(kDigits, at)) != text.npos;) {
+    const std::size_t end = std::min(text.find_first_not_of(kDigits, at), text.size());
+    if (end - at == 4 || end - at == 8) return text.substr(at, 4);
+    at = end;
+  }
   return "";
+}
+
+/// When the model was made, which is not when the object was: that one was found or carved long before. Dates
+/// that say neither count where no other says more.
+std::string year_of(const About& about) {
+  static const std::set<std::string> of_models{"scanned",      "captured", "digitised", "digitized",
+                                               "photographed", "modelled", "modeled",   "xmp:createdate"},
+      of_either{"created", "date", "dc:date", "published"};
+  for (const auto* events : {&of_models, &of_either})
+    for (const NamedText& date : about.dates)
+      if (events->contains(in_lower_case(date.name)))
+        if (const std::string year = year_in(date.text); !year.empty()) return year;
+  return "";
+}
+
+/// How the object wants to be credited, and its licence.
+std::string citation_note(const About& about) {
+  const std::string licence = about.licence.empty() ? "" : "Licence: " + about.licence;
+  return about.attribution + (about.attribution.empty() || licence.empty() ? "" : "; ") + licence;
 }
 
 std::string in_tex(const std::string& text) {
@@ -184,7 +207,7 @@ std::string page_address(const SiteObject& object, const SiteOptions& options) {
 
 std::string viewer_address(const SiteObject& o, const SiteOptions& options) {
   const std::string package = is_web_url(o.address) ? o.address : "../" + o.address;
-  return options.url + "viewer/index.html?panel=0&pkg=" + percent_encoded(package);
+  return options.url + "viewer/index.html?panel=none&pkg=" + percent_encoded(package);
 }
 
 std::string meta_html(const char* kind, const char* name, const std::string& content) {
@@ -239,7 +262,7 @@ std::string bibtex_entry(const SiteObject& o, const SiteOptions& options) {
   add("year", year_of(o.about));
   add("howpublished", "3D model, " + in_tex(options.title));
   if (!options.url.empty()) add("url", page_address(o, options));
-  if (!o.about.licence.empty()) add("note", "Licence: " + in_tex(o.about.licence));
+  add("note", in_tex(citation_note(o.about)));
   return out + "\n}\n";
 }
 
@@ -251,7 +274,7 @@ std::string csl_item(const SiteObject& o, const SiteOptions& options) {
     item["issued"] = {{"date-parts", {{std::stoi(year)}}}};
   item["publisher"] = options.title;
   if (!options.url.empty()) item["URL"] = page_address(o, options);
-  if (!o.about.licence.empty()) item["note"] = "Licence: " + o.about.licence;
+  if (const std::string note = citation_note(o.about); !note.empty()) item["note"] = note;
   return json_text(item, 2) + "\n";
 }
 
@@ -387,7 +410,7 @@ std::string downloads_html(const SiteObject& o, const std::string& root, const S
 }
 
 std::string object_page(const SiteObject& o, const SiteOptions& options, const SiteWords& words) {
-  const std::string root = root_of(o);
+  const std::string root = way_to_root(o);
   // The package's address is encoded twice: the viewer decodes the query before it takes the value for a URL.
   const std::string viewer =
       root + "viewer/index.html?panel=none&pkg=" + percent_encoded(from_below("../", o.address)) +
@@ -496,6 +519,17 @@ Site read_site(const std::string& packages, const SiteOptions& options) {
   std::ranges::sort(site.objects, {},
                     [](const SiteObject& o) { return std::tuple(in_lower_case(o.title), o.path); });
   return site;
+}
+
+std::string unknown_units(const Site& site) {
+  const auto unknown = [](const SiteObject& o) { return o.about.metres_per_unit == 0; };
+  const auto first = std::ranges::find_if(site.objects, unknown);
+  if (site.options.downloads_px == 0 || first == site.objects.end()) return "";
+  const auto count = static_cast<std::uint64_t>(std::ranges::count_if(site.objects, unknown));
+  return fmt::format(
+      "the unit of length of {} is not known{}; programs and iPhones take lengths in the downloads for metres "
+      "(texmesh compile --meta tells the unit)",
+      count == 1 ? first->path : counted(count, "package"), count == 1 ? "" : ", as of " + first->path);
 }
 
 FolderRule site_folder_rule() {

@@ -79,6 +79,10 @@ struct Site {
 /// all.
 Site read_site(const std::string& packages, const SiteOptions& options);
 
+/// What a publisher must know of the lengths in downloads: a sentence, "" where there are none or all
+/// packages know their unit.
+std::string unknown_units(const Site& site);
+
 /// Writes a static site: index.html with posters and search, objects/NAME.html, viewer/, posters/ and, unless
 /// they stand elsewhere, packages/; with an address sitemap.xml, and where asked for downloads/ with GLBs and
 /// USDZs (an object that no USDZ can say has none). Texts of packages stand in it as text only. It asks

@@ -20,6 +20,11 @@ export function slowHostNote(form: string, compressed: boolean, url: string): st
 /** Sources by what browsers call what a policy has forbidden. */
 const sources: Record<string, string> = { blob: 'blob:', 'wasm-eval': "'wasm-unsafe-eval'",
   'trusted-types-policy': 'texmesh', 'trusted-types-sink': 'texmesh' };
+/** What three.js' loader says where the small picture by which it tries a format does not come. */
+const triedInVain = /required by asset but unsupported/;
+const policyWords = (wanted: string[]): string =>
+  "The page's Content-Security-Policy forbids what the object needs: it must have " +
+  `${[...new Set(wanted)].join(', ')}.`;
 /** '' of what is no address. */
 function originOf(url: string, page?: string): string {
   try {
@@ -29,18 +34,21 @@ function originOf(url: string, page?: string): string {
   }
 }
 /** What a policy must allow; '' where it has forbidden nothing that matters. */
-function policyNote(host: string, isUnanswered: boolean, forbidden: Iterable<string>): string {
+function policyNote(host: string, isUnanswered: boolean, all: Iterable<string>, error: unknown): string {
+  const forbidden = [...all];
+  // A page's own pictures do not matter.
+  if (forbidden.includes('img-src data') && error instanceof Error && triedInVain.test(error.message))
+    return policyWords(['img-src data:']);
   // Decoders stand beside the element.
   const hosts = [host, originOf(import.meta.url)].filter((origin) => origin !== '');
-  const lacking = [...forbidden].map((what) => what.split(' ')).filter(([directive, blocked]) =>
+  const lacking = forbidden.map((what) => what.split(' ')).filter(([directive, blocked]) =>
     blocked in sources || (directive === 'connect-src' && hosts.includes(originOf(blocked))));
   // There is a decoder without WebAssembly, and no answer has to do with it.
   const wanted = lacking
     .filter(([, blocked]) => blocked !== 'wasm-eval' || (lacking.length < 2 && !isUnanswered))
     .map(([directive, blocked]) => `${directive.replace(/^require-(trusted-types)-for$/, '$1')} ` +
       (sources[blocked] ?? originOf(blocked)));
-  return wanted.length > 0 ? "The page's Content-Security-Policy forbids what the object needs: it must " +
-    `have ${[...new Set(wanted)].join(', ')}.` : '';
+  return wanted.length > 0 ? policyWords(wanted) : '';
 }
 
 /**
@@ -50,7 +58,7 @@ function policyNote(host: string, isUnanswered: boolean, forbidden: Iterable<str
 export function causeOf(error: unknown, url: string, page: string, forbidden: Iterable<string> = []): string {
   const isUnanswered = error instanceof InputError && !/status/.test(error.found);
   const from = originOf(url, page);
-  const note = policyNote(from, isUnanswered, forbidden);
+  const note = policyNote(from, isUnanswered, forbidden, error);
   if (note && (isUnanswered || !(error instanceof TexmeshError))) return note;
   if (!(error instanceof TexmeshError)) return '';
   const { found, rule } = error, status = Number(/status (\d+)/.exec(found)?.[1] ?? 0);

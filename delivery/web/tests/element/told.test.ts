@@ -57,8 +57,11 @@ it('what a policy forbids is named as it must be allowed', () => {
     [late, ['require-trusted-types-for trusted-types-sink', 'trusted-types trusted-types-policy'],
       'must have trusted-types texmesh.'],
   ];
+  const tried = new Error('THREE.GLTFLoader: WebP required by asset but unsupported.');
+  told.push([tried, ['script-src wasm-eval', 'img-src data'], 'must have img-src data:.']);
   for (const [error, forbidden, words] of told)
     expect(causeOf(error, foreign, page, forbidden)).toContain(words);
+  expect(causeOf(tried, foreign, page, [`img-src ${host}/pixel.gif`])).toBe('');
   // an address that is none
   expect(causeOf(late, 'https://[', page, ['connect-src data'])).toBe('');
   expect(causeOf(asked('https://[', 'Failed to fetch'), 'https://[', page)).toContain('did not answer');

@@ -16,7 +16,7 @@ EmbeddedObject bust() {
   o.about.creator = "A. Smith";
   o.about.licence = "CC-BY-4.0";
   o.about.licence_url = "https://creativecommons.org/licenses/by/4.0/";
-  o.page_url = "https://museum.example/bust/viewer/index.html?panel=0&pkg=../object.texmesh";
+  o.page_url = "https://museum.example/bust/viewer/index.html?panel=none&pkg=../object.texmesh";
   o.thumbnail_url = "https://museum.example/bust/poster.jpg";
   o.thumbnail_width_px = 320;
   o.thumbnail_height_px = 240;
@@ -39,7 +39,7 @@ TEST(Oembed, HasWhatTheTypeRichRequires) {
   EXPECT_EQ(testing::tag_fault(html), "");
   EXPECT_EQ(html.find("<script"), std::string::npos);
   EXPECT_EQ(testing::attributes(html, "src").at(0),
-            "https://museum.example/bust/viewer/index.html?panel=0&amp;pkg=../object.texmesh");
+            "https://museum.example/bust/viewer/index.html?panel=none&amp;pkg=../object.texmesh");
 }
 
 TEST(Oembed, WhatIsNotKnownIsLeftOut) {

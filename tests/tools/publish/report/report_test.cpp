@@ -31,11 +31,11 @@ PackageParts parts_with_poster() {
   return parts;
 }
 
-Report report_of(const Bytes& package, ReportOptions options = {}, int threads = 1) {
+Report report_of(const Bytes& package, ReportOptions options = {}, int threads = 1, int views = 3) {
   PackageReader reader(open_container(memory_source(package)));
   RunContext context;
   context.threads = threads;
-  options.views = 3;
+  options.views = views;
   return make_report(reader, options, context);
 }
 std::string page_of(const Report& report) {
@@ -160,6 +160,20 @@ TEST(Report, AgainstTheSource) {
   EXPECT_TRUE(follows_schema(nlohmann::json::parse(to_json_line(report)), "report.v1"));
   options.against = folder / "none.glb";
   EXPECT_THROW(report_of(sample(), options), InputError);
+}
+
+TEST(Report, ASingleViewStandsThereOnce) {
+  const TemporaryFolder folder;
+  const Bytes glb = parts_with_poster().meshes.rbegin()->second;
+  write_text(folder / "a.glb", std::string(glb.begin(), glb.end()));
+  ReportOptions options;
+  options.against = folder / "a.glb";
+  const Report report = report_of(sample(), options, 1, 1);
+  write_report(report, folder / "r");
+  EXPECT_EQ(files_beneath(folder / "r").size(), report.files.size());
+  const std::string page = page_of(report);
+  EXPECT_NE(page.find("source-front"), std::string::npos);
+  EXPECT_EQ(page.find("-worst"), std::string::npos);
 }
 
 TEST(Report, TheFolderAppearsWholeAndReplacesReportsOnly) {

@@ -1,5 +1,6 @@
 #include "tools/publish/site/site.h"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <map>
@@ -139,6 +140,83 @@ TEST(Site, HasFiguresOfEveryPackageByTitle) {
   EXPECT_EQ(site.objects[1].texture_px, 64u);
   EXPECT_GT(site.objects[1].start_bytes, 0u);
   EXPECT_EQ(site.objects[1].address, "packages/2." + site.objects[1].digest + ".texmesh");
+}
+
+TEST(Site, APackageThatACopyCutOffIsAFault) {
+  TemporaryFolder folder;
+  const std::size_t bytes = add_package(folder, "cut.texmesh", "");
+  add_package(folder, "whole.texmesh", "");
+  std::filesystem::resize_file(folder / "cut.texmesh", bytes - 1);
+  const std::string tree = std::string(TEXMESH_SOURCE_DIR) + "/tests/golden/v2.0-tree";
+  for (const char* name : {"tree", "torn", "short"})
+    std::filesystem::copy(tree, folder / name, std::filesystem::copy_options::recursive);
+  std::filesystem::remove(folder / "torn/mesh/s00.glb");
+  std::filesystem::resize_file(folder / "short/mesh/s00.glb", 100);
+  const Site site = read_site(folder.path().string(), {});
+  std::set<std::string> faults;
+  for (const SiteFault& f : site.faults) faults.insert(f.path);
+  EXPECT_EQ(faults, (std::set<std::string>{"cut.texmesh", "short/", "torn/"}));
+  EXPECT_EQ(site.objects.size(), 2u);
+}
+
+/// The page of the one object of a site whose package says this of itself.
+std::string page_of(const About& about, SiteOptions options = {}) {
+  TemporaryFolder folder;
+  testing::PackageParts parts = testing::make_package_parts();
+  parts.about = about;
+  const Bytes bytes = parts.build();
+  for (const char* name : {"in", "viewer"}) std::filesystem::create_directory(folder / name);
+  testing::write_text(folder / "in/a.texmesh", std::string(bytes.begin(), bytes.end()));
+  options.viewer = folder / "viewer";
+  write_site(read_site(folder / "in", options), folder / "www");
+  return testing::read_text(folder / "www/objects/a.html");
+}
+
+TEST(Site, AFrameOnPagesOfOthersHasNoDevelopersPanel) {
+  SiteOptions options;
+  options.url = "https://museum.example/";
+  const std::string page = page_of({}, options);
+  EXPECT_NE(page.find("viewer/index.html?panel=none&amp;amp;pkg="), page.npos);
+  EXPECT_EQ(page.find("panel=0"), page.npos);
+}
+
+TEST(Site, ACitationHasTheYearOfTheModelAndItsCredit) {
+  About about;
+  about.attribution = "Museum & Co";
+  about.licence = "CC0-1.0";
+  const std::pair<std::vector<NamedText>, const char*> years[] = {
+      {{{"found", "1897"}, {"scanned", "spring 2021"}}, "2021"},
+      {{{"dc:date", "1897"}, {"xmp:CreateDate", "2020-01-02"}}, "2020"},
+      {{{"created", "20190304"}}, "2019"},
+      {{{"date", "no. 12345, 3.4.2018"}}, "2018"},
+      {{{"found", "1897"}, {"Scanned", "last year"}}, ""}};
+  for (const auto& [dates, year] : years) {
+    about.dates = dates;
+    const std::string page = page_of(about);
+    const std::string expected = *year ? fmt::format("year = {{{}}}", year) : "";
+    EXPECT_NE(page.find(expected), page.npos) << year;
+    EXPECT_EQ(page.find("year = ") != page.npos, *year != 0) << dates[0].text;
+    EXPECT_EQ(page.find("issued") != page.npos, *year != 0) << dates[0].text;
+    EXPECT_NE(page.find("note = {Museum \\&amp; Co; Licence: CC0-1.0}"), page.npos);
+    EXPECT_NE(page.find("&quot;note&quot;: &quot;Museum &amp; Co; Licence: CC0-1.0&quot;"), page.npos);
+  }
+}
+
+TEST(Site, DownloadsOfUnknownUnitsAreTold) {
+  TemporaryFolder folder;
+  for (const char* name : {"a", "b"}) add_package(folder, std::string(name) + ".texmesh", "");
+  SiteOptions options;
+  EXPECT_EQ(unknown_units(read_site(folder.path().string(), options)), "");
+  options.downloads_px = 64;
+  Site site = read_site(folder.path().string(), options);
+  for (SiteObject& o : site.objects) o.about.metres_per_unit = 0;
+  EXPECT_TRUE(
+      unknown_units(site).starts_with("the unit of length of 2 packages is not known, as of a.texmesh;"))
+      << unknown_units(site);
+  site.objects[0].about.metres_per_unit = 0.001;
+  EXPECT_TRUE(unknown_units(site).starts_with("the unit of length of b.texmesh is not known; "));
+  site.objects[1].about.metres_per_unit = 1;
+  EXPECT_EQ(unknown_units(site), "");
 }
 
 TEST(Site, AFolderWithoutPackagesIsRefused) {
