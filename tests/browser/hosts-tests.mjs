@@ -76,6 +76,15 @@ test('hosts: where a policy forbids decoders, a sentence says that nothing comes
   page.said = page.said.filter((s) => !kBrowsers.test(s) && !/the decoder of meshes gives no answer/.test(s));
 }, {policy: "script-src 'self'; style-src 'self' 'unsafe-inline'"}));
 
+test('hosts: where a policy forbids the picture by which three.js tries WebP, the console has the source that lacks', () => onPage(one('', 'large'), async (page) => {
+  const told = [];
+  page.on('console', (m) => m.type() === 'info' && told.push(m.text()));
+  const named = () => told.some((t) => /Content-Security-Policy.*must have img-src data:\./.test(t));
+  for (let left = 100; left > 0 && !named(); left--) await page.waitForTimeout(100);
+  check(named(), `${JSON.stringify(await model(page))}; ${told.join('\n')}`);
+  page.said = page.said.filter((s) => !kBrowsers.test(s));
+}, {policy: kPolicy.replace('img-src data:', "img-src 'self'")}));
+
 test('hosts: a script of another host has its workers, too', async () => {
   const other = await serve(kElement);
   try {

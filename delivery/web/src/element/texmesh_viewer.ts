@@ -264,6 +264,7 @@ export class TexmeshViewer extends HTMLElement {
       if (fatal) return this.fail_(problem, true);
       if (model.lacking) this.note_(this.words_.rest, noteMs);
       if (!told) console.info(`<texmesh-viewer src="${this.src}">: ${message}`);
+      if (!told && forbidden.size > 0) this.tellCause_(problem);
       told = true;
     });
     this.note_(this.hasPoster_ ? '' : this.words_.loading);
@@ -275,9 +276,9 @@ export class TexmeshViewer extends HTMLElement {
   /** A sentence and a way on for visitors; the rest for those who look after the page. */
   private fail_(problem: unknown, again: boolean): void {
     const { error, bar } = this.parts_;
-    const said = this.words_, { src } = this;
-    console.error(`<texmesh-viewer src="${src}">:`, problem);
-    void this.tellOwner_(({ causeOf }) => causeOf(problem, src, document.baseURI, forbidden));
+    const said = this.words_;
+    console.error(`<texmesh-viewer src="${this.src}">:`, problem);
+    this.tellCause_(problem);
     // What fails before there is a model: the browser has no WebGL.
     const what = again ? sentenceOf(problem) : 'no3d';
     const button = Object.assign(document.createElement('button'),
@@ -286,6 +287,10 @@ export class TexmeshViewer extends HTMLElement {
     error.hidden = false;
     bar.hidden = true;
     this.note_('');
+  }
+  private tellCause_(problem: unknown): void {
+    const { src } = this;
+    void this.tellOwner_(({ causeOf }) => causeOf(problem, src, document.baseURI, forbidden));
   }
   private async tellOwner_(text: (by: typeof import('./for_owners')) => string): Promise<void> {
     const by = await import('./for_owners').catch(() => undefined);
