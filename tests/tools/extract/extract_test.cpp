@@ -281,6 +281,23 @@ TEST(ExtractModel, AUsdzOfFewBytesIsLookedForUntilItFits) {
   EXPECT_LT(least.glb.size(), found.glb.size());
 }
 
+TEST(ExtractModel, AUsdzHasJpegWhereWebpOrAvifIsAskedForAndSaysSo) {
+  for (const ExtractImages images : {ExtractImages::kWebp, ExtractImages::kAvif}) {
+    ExtractScale scale;
+    scale.images = images;
+    ExtractBudget bytes = budget({60'000});
+    bytes.images = images;
+    for (const ExtractRequest& request : {ExtractRequest{scale}, ExtractRequest{bytes}}) {
+      PackageReader package = open(package_bytes());
+      const Extracted file = extract_usdz(package, request, {}).front();
+      EXPECT_EQ(file.images.at(0).format, FileImage::kJpeg);
+      EXPECT_EQ(std::ranges::count_if(file.notes,
+                                      [](const auto& n) { return n.find("are JPEG or PNG") != n.npos; }),
+                1);
+    }
+  }
+}
+
 TEST(ExtractModel, ReportsAreJson) {
   ExtractBudget r = budget({3000});
   r.images = ExtractImages::kWebp;
