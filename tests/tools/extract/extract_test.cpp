@@ -9,6 +9,7 @@
 #include "stages/gltf/check_glb.h"
 #include "stages/image/decode_image.h"
 #include "tests/support/packages.h"
+#include "tools/extract/budget/candidates.h"
 #include "tools/extract/extract.h"
 #include "tools/extract/usdz/usdz.h"
 
@@ -145,6 +146,26 @@ TEST(ExtractModel, LevelsShareTexturesAndStandBehindTheFinest) {
   ASSERT_EQ(coverage.size(), 2u);
   EXPECT_GT(coverage[0], coverage[1]);
   EXPECT_EQ(coverage[1], 0);
+}
+
+TEST(ExtractModel, ALevelIsAStepAndCoversTheScreenUntilTheNextOneIsEnough) {
+  Manifest m;
+  for (const int scale : {0, 2, 4, 7, 10, 17}) {
+    m.scales.emplace_back().scale = scale;
+    m.scales.back().major = scale == 17;
+  }
+  m.steps = {{135, 10}, {540, 7}, {1080, 4}, {kAnyDisplayPx, 0}};
+  const auto coverages = [&](const std::vector<int>& levels) {
+    std::vector<double> out;
+    for (std::size_t l = 0; l < levels.size(); ++l) out.push_back(screen_coverage_of(m, levels, l));
+    return out;
+  };
+  EXPECT_EQ(levels_of(m, 0), (std::vector<int>{0, 4, 7, 10}));
+  EXPECT_EQ(coverages({0, 4, 7, 10}), (std::vector<double>{1, 0.25, 0.015625, 0}));
+  EXPECT_EQ(levels_of(m, 2), (std::vector<int>{2, 4, 7, 10}));
+  EXPECT_EQ(levels_of(m, 10), (std::vector<int>{10, 17})) << "no step has a coarser scale";
+  EXPECT_EQ(coverages({10, 17}), (std::vector<double>{0, 0}));
+  EXPECT_EQ(levels_of(m, 17), std::vector<int>{17});
 }
 
 TEST(ExtractModel, BytesAreMetWithinTwoPercentFromBelow) {
