@@ -384,6 +384,9 @@ void add_collection(const std::string& file, const PlanRequest& request, const C
 
 [[noreturn]] void refuse_package(const std::string& input, const std::string& output,
                                  const std::string& other) {
+  std::error_code ec;
+  if (fs::equivalent(input, other, ec))
+    throw InputError(input, "", "every model once", "it twice, the other time as " + other);
   throw InputError(
       input, "",
       "a package of its own (--names full names packages by format, too; a collection.json names each)",

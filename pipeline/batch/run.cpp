@@ -48,14 +48,16 @@ class Batch {
   }
 
  private:
+  /// A new package that cannot be written is told before the work. One that is there may turn out to be up to
+  /// date.
   void make_folders() const {
     std::set<std::string> made;
     for (const WorkerJob& job : selection_.jobs()) {
       const std::string folder = fs::path(job.output).parent_path().string();
-      if (folder.empty() || !made.insert(folder).second) continue;
       std::error_code ec;
-      fs::create_directories(folder, ec);
+      if (!folder.empty() && made.insert(folder).second) fs::create_directories(folder, ec);
       if (ec) fail_to_write(folder, "", ec.value());
+      if (!fs::exists(job.output, ec)) check_output_file(job.output);
     }
   }
 

@@ -326,11 +326,11 @@ void add_compile_options(Command& c, CompileArguments& args) {
       .required();
   c.option("-o,--output", args.output, "NAME.texmesh for one model, a folder for several models", "OUTPUT")
       .required();
-  c.option("--profile", args.profile,
-           "small = few bytes, archive = loses nothing, fast = little time, thesis = as printed; or a JSON "
-           "file of "
-           "options. Flags win",
-           "NAME");
+  c.option(
+      "--profile", args.profile,
+      "small = few bytes, archive = the source's own images and finer meshes, fast = little time, thesis = "
+      "as printed; or a JSON file of options. Flags win",
+      "NAME");
   c.option(
        "--jnd-profile", args.jnd_profile,
        "JSON file of what judges could just tell (schemas/jnd-profile.v1.schema.json). The file wins over "

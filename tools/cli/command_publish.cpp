@@ -433,10 +433,10 @@ void add_extract_options(Command& c, ExtractArguments& args) {
          "request. Bytes may be left over")
       .excludes(best);
   add_image_format_option(c, args.images);
-  const Option lods = c.flag(
-      "--lods", args.levels,
-      "All major scales from the chosen one on as levels of detail of one file (MSFT_lod), which share "
-      "textures");
+  const Option lods =
+      c.flag("--lods", args.levels,
+             "The chosen scale and all coarser ones of the step function as levels of detail of one file "
+             "(MSFT_lod), which share textures");
   c.flag(
        "--plain", args.plain,
        "Meshes as floats and images as JPEG or PNG, without extensions that compress: for programs that read "
@@ -529,7 +529,7 @@ void add_export_command(Command& app) {
       "coarsest level is outermost. Levels that save less than a quarter of the bytes are left out. A "
       "viewer whose limit is --screen-error takes the next level at that height. The object stands where "
       "its source has it; nothing puts it on the globe.\n"
-      "gltf-lod: all major scales from the finest on; levels share materials and textures.\n"
+      "gltf-lod: S_0 and all scales of the step function; levels share materials and textures.\n"
       "model-viewer: index.html, model.glb and the poster, which stands there, too, where the script is blocked. The "
       "script stands beside it, unless --script names another; with --draco or --bytes it fetches a decoder "
       "from gstatic.com.\n"

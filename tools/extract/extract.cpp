@@ -37,10 +37,10 @@ class ScaleExtraction {
     out.triangles = scale_entry(out.scale).triangles;
     out.levels = has_levels ? levels_of(manifest_, out.scale) : std::vector<int>{out.scale};
     StandaloneGlb file = scale_file(package_, out.scale, context_);
-    if (has_levels) file.begin_levels(screen_coverage_of(manifest_, out.scale));
+    if (has_levels) file.begin_levels(screen_coverage_of(manifest_, out.levels, 0));
     for (std::size_t l = 1; l < out.levels.size(); ++l)
       file.add_level(scale_file(package_, out.levels[l], context_),
-                     screen_coverage_of(manifest_, out.levels[l]));
+                     screen_coverage_of(manifest_, out.levels, l));
     if (wishes_.form == ExtractScale::Form::kPlain) file = plain_file(file, mesh_path(out.scale), context_);
     file.place(place);
     const std::map<std::uint32_t, std::uint32_t> planes = shown_planes();

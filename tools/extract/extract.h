@@ -18,7 +18,7 @@ struct EnumNames<ExtractImages> {
 /// A scale with whole textures.
 struct ExtractScale {
   /// kCoded: meshes as the package codes them. kPlain: without extensions that compress (plain_file()).
-  /// kLevels: all major scales from the chosen one on, as levels of detail (MSFT_lod).
+  /// kLevels: the chosen scale and all coarser ones of the step function, as levels of detail (MSFT_lod).
   enum class Form : std::uint8_t { kCoded, kPlain, kLevels };
   std::optional<int> scale;        // else the one that suits `display_px`
   std::uint32_t rung = kBestRung;  // of full-size planes

@@ -126,8 +126,10 @@ TEST(FindModels, NoOtherModelChangesAName) {
   }
 }
 
-/// What plan_batch() says of a folder with these files; "" where it takes it.
-std::string refusal_of(const std::vector<std::string>& files, PackageNames names = PackageNames::kStem) {
+/// What plan_batch() says of a folder with these files, of which `again` is given beside the folder; "" where
+/// it takes it.
+std::string refusal_of(const std::vector<std::string>& files, PackageNames names = PackageNames::kStem,
+                       const std::string& again = "") {
   const TemporaryFolder folder;
   for (const std::string& file : files) {
     fs::create_directories(fs::path(folder / file).parent_path());
@@ -135,6 +137,7 @@ std::string refusal_of(const std::vector<std::string>& files, PackageNames names
   }
   PlanRequest request;
   request.inputs = {folder.path().string()};
+  if (!again.empty()) request.inputs.push_back(folder / again);
   request.output = folder / "out";
   request.names = names;
   try {
@@ -153,6 +156,14 @@ TEST(FindModels, TwoModelsOfOneNameAreRefusedAndBothNamed) {
     EXPECT_NE(said.find(b), std::string::npos) << said;
     EXPECT_NE(said.find("--names full"), std::string::npos) << said;
     EXPECT_EQ(refusal_of({a, b, "other.glb"}, PackageNames::kFull), "");
+  }
+}
+
+TEST(FindModels, AModelThatIsGivenTwiceIsToldSo) {
+  for (const PackageNames names : {PackageNames::kStem, PackageNames::kFull}) {
+    const std::string said = refusal_of({"site.glb", "other.glb"}, names, "site.glb");
+    EXPECT_NE(said.find("every model once"), std::string::npos) << said;
+    EXPECT_EQ(said.find("--names full"), std::string::npos) << said;
   }
 }
 

@@ -343,6 +343,24 @@ TEST_F(Collection, ReportsGoIntoDevicesAndOneThatCannotBeWrittenIsUsage) {
             2);
 }
 
+TEST_F(Collection, AFolderThatCannotBeWrittenIsToldBeforeTheWork) {
+  if (::geteuid() == 0) GTEST_SKIP() << "root writes everywhere";
+  ASSERT_NO_FATAL_FAILURE(add_model("a", 1));
+  const std::string out = folder_ / "out";
+  fs::create_directories(out);
+  ::chmod(out.c_str(), 0500);
+  const CommandResult early = compile({"--verbose"});
+  EXPECT_EQ(early.output.find("simplification"), std::string::npos) << early.output;
+  EXPECT_NE(early.errors.find("out/a.texmesh: "), std::string::npos) << early.errors;
+  EXPECT_NE(early.exit_code, 0);
+  ::chmod(out.c_str(), 0700);
+  ASSERT_EQ(compile().exit_code, 0);
+  ::chmod(out.c_str(), 0500);
+  fs::remove_all(folder_ / "cache");
+  EXPECT_EQ(compile().exit_code, 0) << "what is up to date needs no folder that can be written";
+  ::chmod(out.c_str(), 0700);
+}
+
 TEST_F(Collection, ShardsTogetherMakeEveryPackageOnce) {
   ASSERT_NO_FATAL_FAILURE(add_three());
   std::multiset<std::string> made;

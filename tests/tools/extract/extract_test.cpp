@@ -9,6 +9,7 @@
 #include "stages/gltf/check_glb.h"
 #include "stages/image/decode_image.h"
 #include "tests/support/packages.h"
+#include "tools/extract/budget/candidates.h"
 #include "tools/extract/extract.h"
 #include "tools/extract/usdz/usdz.h"
 
@@ -147,6 +148,26 @@ TEST(ExtractModel, LevelsShareTexturesAndStandBehindTheFinest) {
   EXPECT_EQ(coverage[1], 0);
 }
 
+TEST(ExtractModel, ALevelIsAStepAndCoversTheScreenUntilTheNextOneIsEnough) {
+  Manifest m;
+  for (const int scale : {0, 2, 4, 7, 10, 17}) {
+    m.scales.emplace_back().scale = scale;
+    m.scales.back().major = scale == 17;
+  }
+  m.steps = {{135, 10}, {540, 7}, {1080, 4}, {kAnyDisplayPx, 0}};
+  const auto coverages = [&](const std::vector<int>& levels) {
+    std::vector<double> out;
+    for (std::size_t l = 0; l < levels.size(); ++l) out.push_back(screen_coverage_of(m, levels, l));
+    return out;
+  };
+  EXPECT_EQ(levels_of(m, 0), (std::vector<int>{0, 4, 7, 10}));
+  EXPECT_EQ(coverages({0, 4, 7, 10}), (std::vector<double>{1, 0.25, 0.015625, 0}));
+  EXPECT_EQ(levels_of(m, 2), (std::vector<int>{2, 4, 7, 10}));
+  EXPECT_EQ(levels_of(m, 10), (std::vector<int>{10, 17})) << "no step has a coarser scale";
+  EXPECT_EQ(coverages({10, 17}), (std::vector<double>{0, 0}));
+  EXPECT_EQ(levels_of(m, 17), std::vector<int>{17});
+}
+
 TEST(ExtractModel, BytesAreMetWithinTwoPercentFromBelow) {
   const std::uint64_t smallest = extract_within(1).glb.size();
   const Extracted most = extract_within(10'000'000);
@@ -279,6 +300,23 @@ TEST(ExtractModel, AUsdzOfFewBytesIsLookedForUntilItFits) {
   const Extracted least = extract_usdz(package, {budget({1})}, {}).front();
   EXPECT_FALSE(least.within);
   EXPECT_LT(least.glb.size(), found.glb.size());
+}
+
+TEST(ExtractModel, AUsdzHasJpegWhereWebpOrAvifIsAskedForAndSaysSo) {
+  for (const ExtractImages images : {ExtractImages::kWebp, ExtractImages::kAvif}) {
+    ExtractScale scale;
+    scale.images = images;
+    ExtractBudget bytes = budget({60'000});
+    bytes.images = images;
+    for (const ExtractRequest& request : {ExtractRequest{scale}, ExtractRequest{bytes}}) {
+      PackageReader package = open(package_bytes());
+      const Extracted file = extract_usdz(package, request, {}).front();
+      EXPECT_EQ(file.images.at(0).format, FileImage::kJpeg);
+      EXPECT_EQ(std::ranges::count_if(file.notes,
+                                      [](const auto& n) { return n.find("are JPEG or PNG") != n.npos; }),
+                1);
+    }
+  }
 }
 
 TEST(ExtractModel, ReportsAreJson) {

@@ -17,16 +17,19 @@ constexpr std::size_t kMostScales = 3;        // decoded at a time: tens of mega
 
 std::vector<int> levels_of(const Manifest& manifest, int finest) {
   std::vector<int> out{finest};
-  for (const ManifestScale& s : manifest.scales)
-    if (s.major && s.scale > finest) out.push_back(s.scale);
+  for (const ManifestStep& s : manifest.steps | std::views::reverse)
+    if (s.scale > finest) out.push_back(s.scale);
+  if (const int coarsest = manifest.scales.back().scale; out.size() == 1 && coarsest > finest)
+    out.push_back(coarsest);
   return out;
 }
 
-double screen_coverage_of(const Manifest& manifest, int scale) {
+double screen_coverage_of(const Manifest& manifest, const std::vector<int>& levels, std::size_t level) {
   constexpr double kScreenPx = 1080;
-  double below = 0;  // displayed height up to which a coarser scale is enough
+  if (level + 1 >= levels.size()) return 0;
+  double below = 0;  // displayed height up to which the next level is enough
   for (const ManifestStep& s : manifest.steps)
-    if (s.scale > scale) below = std::max(below, s.up_to_px);
+    if (s.scale >= levels[level + 1]) below = std::max(below, s.up_to_px);
   const double share = std::min(1.0, below / kScreenPx);
   return share * share;
 }
@@ -84,9 +87,9 @@ const MeshCandidate& Candidates::mesh(const MeshKey& key) {
   std::unique_ptr<StandaloneGlb> file = recoded_scale(c.scale, key);
   const bool looked_at = !reference_.wishes.fast() && !key.is_finest();
   if (looked_at) c.lit = made_lit_mesh(*file, c.scale);
-  if (reference_.wishes.levels) file->begin_levels(screen_coverage_of(m, c.scale));
+  if (reference_.wishes.levels) file->begin_levels(screen_coverage_of(m, c.levels, 0));
   for (std::size_t l = 1; l < c.levels.size(); ++l)
-    file->add_level(*recoded_scale(c.levels[l], key), screen_coverage_of(m, c.levels[l]));
+    file->add_level(*recoded_scale(c.levels[l], key), screen_coverage_of(m, c.levels, l));
   file->place(reference_.place);
   c.file = std::move(file);
   if (!looked_at) return c;

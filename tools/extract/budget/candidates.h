@@ -1,6 +1,7 @@
 #pragma once
 #include <compare>
 #include <list>
+#include <ranges>
 
 #include "stages/gltf/scale_fineness.h"
 #include "tools/extract/budget/texture_tiles.h"
@@ -8,11 +9,13 @@
 
 namespace texmesh {
 
-/// Scales of a file with levels of detail whose finest is `finest`: that one, and all coarser major ones.
+/// Scales of a file with levels of detail whose finest is `finest`: that one, and all coarser ones of the
+/// step function; where that has none, the coarsest scale, which some viewers show while the others load.
 std::vector<int> levels_of(const Manifest& manifest, int finest);
-/// Share of the screen's area that a square around the object has at the displayed height up to which `scale`
-/// is enough, on a screen 1080 px high; what MSFT_lod asks for a level.
-double screen_coverage_of(const Manifest& manifest, int scale);
+/// What MSFT_lod asks for a level: viewers show it above this share of the screen's area. A square around the
+/// object has it at the displayed height up to which the next of `levels` is enough, on a screen 1080 px
+/// high. 0 of the last level.
+double screen_coverage_of(const Manifest& manifest, const std::vector<int>& levels, std::size_t level);
 
 /// How many ways to code a mesh there are, from the leanest to the finest (of S_0: as it is stored).
 inline constexpr int kMeshCodings = static_cast<int>(kScaleFineness.size());

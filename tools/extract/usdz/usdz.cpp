@@ -275,13 +275,16 @@ std::vector<FileImageData> take_images(GlbParts& parts) {
   return out;
 }
 
+std::string note_of_other_images(bool webp) {
+  return std::string(webp ? "WebP" : "AVIF") + " images are JPEG or PNG in the USDZ, which has no others";
+}
+
 /// The image as JPEG or PNG.
 FileImageData readable(FileImageData image, bool numbers, std::vector<std::string>& notes) {
   if (image.format == FileImage::kJpeg || image.format == FileImage::kPng) return image;
   const Pixels pixels = decode_file_image(image);
   const FileImage format = pixels.channels == 4 || pixels.channels == 2 ? FileImage::kPng : FileImage::kJpeg;
-  const std::string note = std::string(image.format == FileImage::kWebp ? "WebP" : "AVIF") +
-                           " images are JPEG or PNG in the USDZ, which has no others";
+  const std::string note = note_of_other_images(image.format == FileImage::kWebp);
   if (std::ranges::find(notes, note) == notes.end()) notes.push_back(note);
   return {format, encode_image(pixels, {format, kNewJpegQuality, numbers})};
 }
@@ -587,10 +590,10 @@ class UsdzFiles {
   About about_;
 };
 
-void choose_images(ExtractImages& images, const std::string& entry) {
-  if (images == ExtractImages::kWebp || images == ExtractImages::kAvif)
-    throw InputError(entry, "USDZ", "images as JPEG or PNG", enum_name(images) == "webp" ? "WebP" : "AVIF");
-  if (images == ExtractImages::kAuto) images = ExtractImages::kJpeg;
+/// Images that no USDZ holds are JPEG or PNG from the start, so that they are coded once. Returns what was
+/// asked for.
+ExtractImages choose_images(ExtractImages& images) {
+  return std::exchange(images, images == ExtractImages::kPng ? images : ExtractImages::kJpeg);
 }
 
 }  // namespace
@@ -598,14 +601,19 @@ void choose_images(ExtractImages& images, const std::string& entry) {
 std::vector<Extracted> extract_usdz(PackageReader& package, ExtractRequest request,
                                     const RunContext& context) {
   const std::string entry = package.store().name();
+  ExtractImages asked = ExtractImages::kAuto;
   if (auto* scale = std::get_if<ExtractScale>(&request.file)) {
     if (scale->form == ExtractScale::Form::kLevels) refuse(entry, "levels of detail");
-    choose_images(scale->images, entry);
+    asked = choose_images(scale->images);
   } else if (auto* budget = std::get_if<ExtractBudget>(&request.file)) {
     if (budget->levels) refuse(entry, "levels of detail");
-    choose_images(budget->images, entry);
+    asked = choose_images(budget->images);
   }
-  return UsdzFiles(package, std::move(request), context).run();
+  std::vector<Extracted> files = UsdzFiles(package, std::move(request), context).run();
+  if (asked == ExtractImages::kWebp || asked == ExtractImages::kAvif)
+    for (Extracted& file : files)
+      if (!file.images.empty()) file.notes.push_back(note_of_other_images(asked == ExtractImages::kWebp));
+  return files;
 }
 
 }  // namespace texmesh

@@ -19,8 +19,8 @@ Usdz usdz_of(const Extracted& extracted, const About& about, const std::string& 
              const RunContext& context);
 
 /// Extracted files, each as USDZ in the place of its GLB. With numbers of bytes: the largest of a few files
-/// that keep within them; they are compared as the GLBs are, and need not reach 98 %. InputError for wishes
-/// that no USDZ meets: levels of detail, WebP, AVIF.
+/// that keep within them; they are compared as the GLBs are, and need not reach 98 %. WebP and AVIF become
+/// JPEG or PNG, and a note says so. InputError for levels of detail.
 std::vector<Extracted> extract_usdz(PackageReader& package, ExtractRequest request,
                                     const RunContext& context);
 
