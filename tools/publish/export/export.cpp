@@ -243,7 +243,7 @@ void export_lods(PackageReader& package, const ExportOptions& options, const Run
   Extracted extracted = extract_model(package, request_for(options, ExtractScale::Form::kLevels), context);
   if (extracted.levels.size() < 2)
     throw InputError(package.store().name(), "scales",
-                     "a major scale coarser than S_" + std::to_string(extracted.scale) +
+                     "a scale coarser than S_" + std::to_string(extracted.scale) +
                          ", for levels of detail (MSFT_lod)",
                      "none; texmesh extract writes the one");
   note_large_textures(extracted, made);
