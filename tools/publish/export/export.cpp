@@ -242,10 +242,10 @@ void export_lods(PackageReader& package, const ExportOptions& options, const Run
     throw InputError(package.store().name(), "scales", "two or more, for levels of detail (MSFT_lod)", "one");
   Extracted extracted = extract_model(package, request_for(options, ExtractScale::Form::kLevels), context);
   if (extracted.levels.size() < 2)
-    throw InputError(package.store().name(), "scales",
-                     "a scale coarser than S_" + std::to_string(extracted.scale) +
-                         ", for levels of detail (MSFT_lod)",
-                     "none; texmesh extract writes the one");
+    throw InputError(
+        package.store().name(), "scales",
+        "a scale coarser than S_" + std::to_string(extracted.scale) + ", for levels of detail (MSFT_lod)",
+        "none; texmesh extract writes the one");
   note_large_textures(extracted, made);
   made.open = "model.glb";
   add_glb(made, std::move(extracted), made.open);
