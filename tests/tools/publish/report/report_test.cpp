@@ -170,7 +170,7 @@ TEST(Report, ASingleViewStandsThereOnce) {
   options.against = folder / "a.glb";
   const Report report = report_of(sample(), options, 1, 1);
   write_report(report, folder / "r");
-  EXPECT_EQ(files_beneath(folder / "r").size(), report.files.size());
+  EXPECT_EQ(files_beneath(folder / "r").size(), report.files.size() + 1);
   const std::string page = page_of(report);
   EXPECT_NE(page.find("source-front"), std::string::npos);
   EXPECT_EQ(page.find("-worst"), std::string::npos);
